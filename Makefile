@@ -1,0 +1,43 @@
+# The two commands of the README are `make paper` and `make test`; each builds .venv by itself.
+PYTHON ?= python3
+BIN := .venv/bin
+export OPENBLAS_NUM_THREADS ?= 1
+export OMP_NUM_THREADS ?= 1
+
+.PHONY: help setup paper test bench lint clean
+
+help:
+	@echo "make paper   compute the paper's figures and claims into out/paper/"
+	@echo "make test    lint, types, import boundaries and the whole test suite"
+	@echo "make bench   certificates and control ticks beside their peers, as ratios"
+	@echo "make setup   build .venv only (the other commands do this by themselves)"
+
+setup: .venv/.ready
+
+.venv/.ready: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "sealag needs Python 3.11 or newer; set PYTHON=/path/to/python3.11")'
+	@echo "[1/3] creating .venv"
+	@$(PYTHON) -m venv .venv
+	@echo "[2/3] installing the packages pinned in constraints.txt"
+	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -q -c constraints.txt -e '.[dev]'
+	@echo "[3/3] compiling kernels"
+	@$(BIN)/python -m sealag.kernels
+	@touch $@
+
+paper: setup
+	$(BIN)/sealag paper --out out/paper
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+test: lint
+	$(BIN)/pytest
+
+bench: setup
+	$(BIN)/python -m bench
+
+clean:
+	rm -rf out .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,17 @@
+"""Array aliases. A name says what an array is; docstrings say its shape."""
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+"""Array of doubles."""
+
+IntArray: TypeAlias = NDArray[np.int64]
+"""Array of 64-bit integers."""
+
+BoolArray: TypeAlias = NDArray[np.bool_]
+"""Array of truth values."""
+
+__all__ = ["Array", "ArrayLike", "BoolArray", "IntArray"]
