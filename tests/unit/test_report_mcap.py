@@ -1,0 +1,110 @@
+"""A recording comes back as it went in, also when it was cut off or the disk filled up."""
+
+import errno
+import json
+import os
+
+import numpy as np
+import pytest
+
+from sealag.errors import FileError, InputError
+from sealag.report import McapRecorder, read_recording
+from sealag.report import _mcap as mcap_module
+
+JOINTS = ("hip", "knee")
+
+
+def _write(path, count=500, **options):
+    rng = np.random.default_rng(3)
+    time = np.arange(count) * 1e-3
+    data = {"q": rng.normal(size=(count, 2)), "poses": rng.normal(size=(count, 7))}
+    with McapRecorder(path=path, joints=JOINTS, **options) as recorder:
+        recorder.write_joint_states(time, data["q"], 2 * data["q"], effort=3 * data["q"])
+        recorder.write_transforms(["base"], time, data["poses"])
+        recorder.write_signal("/energy", ["kinetic_j", "spring_j"], time, values=data["q"])
+    return time, data
+
+
+def test_round_trip_is_exact(tmp_path):
+    path = tmp_path / "run.mcap"
+    time, data = _write(path, metadata={"seed": "7"}, attachments={"project.toml": b"[robot]"})
+    recording = read_recording(path)
+    assert recording.complete
+    assert recording.metadata["seed"] == "7"
+    assert recording.attachments["project.toml"] == b"[robot]"
+    joints = recording.signals["/joint_states"]
+    np.testing.assert_allclose(joints.time, time, atol=1e-9)
+    np.testing.assert_array_equal(joints.column("knee:velocity"), 2 * data["q"][:, 1])
+    np.testing.assert_array_equal(joints.column("hip:effort"), 3 * data["q"][:, 0])
+    np.testing.assert_array_equal(recording.signals["/tf"].values, data["poses"])
+    np.testing.assert_array_equal(recording.signals["/energy"].values, data["q"])
+    assert os.listdir(tmp_path) == ["run.mcap"]
+
+
+def test_an_independent_reader_sees_foxglove_messages(tmp_path):
+    from mcap.reader import make_reader
+
+    path = tmp_path / "run.mcap"
+    _write(path, count=3)
+    with open(path, "rb") as file:
+        found = [
+            (s.name, c.topic, json.loads(m.data)) for s, c, m in make_reader(file).iter_messages()
+        ]
+    names = {name for name, _, _ in found}
+    assert {"foxglove.JointStates", "foxglove.FrameTransforms", "sealag.energy"} == names
+    assert len(found) == 9
+
+
+def test_interrupted_recording_is_closed_and_readable(tmp_path):
+    path = tmp_path / "run.mcap"
+    with pytest.raises(KeyboardInterrupt), McapRecorder(path=path, joints=JOINTS) as recorder:
+        recorder.write_signal("/x", ["a"], [0.0, 1.0], values=[[1.0], [2.0]])
+        raise KeyboardInterrupt
+    recording = read_recording(path)
+    assert recording.complete
+    np.testing.assert_array_equal(recording.signals["/x"].values[:, 0], [1.0, 2.0])
+
+
+def test_truncated_file_gives_what_it_holds(tmp_path):
+    path = tmp_path / "run.mcap"
+    _write(path, count=6000)
+    whole = read_recording(path).signals["/joint_states"]
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    recording = read_recording(path)
+    part = recording.signals["/joint_states"]
+    assert not recording.complete
+    assert 0 < len(part.time) < len(whole.time)
+    np.testing.assert_array_equal(part.values, whole.values[: len(part.time)])
+
+
+def test_full_disk_keeps_what_was_recorded(tmp_path, monkeypatch):
+    real = mcap_module._ReservedFile._write_all
+
+    def write(self, data):
+        if not self.full and self.tell() + len(data) > 300_000:
+            self._file.write(bytes(data)[: len(data) // 2])
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(self, data)
+
+    monkeypatch.setattr(mcap_module._ReservedFile, "_write_all", write)
+    path = tmp_path / "run.mcap"
+    with pytest.raises(FileError, match="disk is full"):
+        _write(path, count=20000)
+    recording = read_recording(path)
+    assert recording.complete
+    assert len(recording.signals["/joint_states"].time) > 100
+    assert os.listdir(tmp_path) == ["run.mcap"]
+
+
+def test_wrong_shapes_and_files_are_refused(tmp_path):
+    with McapRecorder(path=tmp_path / "r.mcap", joints=JOINTS) as recorder:
+        with pytest.raises(InputError, match="need \\(2, 1\\)"):
+            recorder.write_signal("/x", ["a"], [0.0, 1.0], values=[[1.0]])
+        with pytest.raises(InputError, match="begun with"):
+            recorder.write_signal("/y", ["a"], [0.0], values=[[1.0]])
+            recorder.write_signal("/y", ["b"], [0.0], values=[[1.0]])
+    (tmp_path / "no.mcap").write_text("nothing")
+    with pytest.raises(FileError, match="not an MCAP"):
+        read_recording(tmp_path / "no.mcap")
+    with pytest.raises(FileError, match="cannot be read"):
+        read_recording(tmp_path / "missing.mcap")
