@@ -1,0 +1,239 @@
+"""Contact-consistent, prioritised operational space at one instant, on preallocated arrays."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from sealag.kernels.dense import invert_spd, multiply, multiply_transposed, pseudo_inverse_psd
+from sealag.typing import Array
+
+SYMMETRIC, PUBLISHED, FORCE = 0, 1, 2
+
+
+class Space(NamedTuple):
+    """Results and scratch of `operational_space`; everything is written in place.
+
+    Sizes: nv velocities, n actuated joints, c contact rows, m task rows in all levels.
+    """
+
+    J_star: Array  # (m, n)
+    stiffness: Array  # (m, m), blocks of the levels on the diagonal
+    joint_from_base: Array  # (nv, n): dynamically consistent inverse of U N_s
+    gravity: Array  # (n,) compensation torque
+    M_inverse: Array  # (nv, nv)
+    P: Array  # (nv, nv)
+    square_v: Array  # (nv, nv)
+    square_n: Array  # (3, n, n)
+    square_c: Array  # (4, c, c)
+    square_m: Array  # (5, m, m)
+    wide_c: Array  # (2, c, nv)
+    wide_m: Array  # (2, m, nv)
+    tall_n: Array  # (nv, n)
+    values: Array  # (max(n, c, m),)
+
+
+def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
+    """Allocate the arrays of one operational space.
+
+    Args:
+        nv: number of velocities.
+        n: number of actuated joints.
+        c: number of contact rows.
+        m: number of task rows.
+    """
+    return Space(
+        J_star=np.zeros((m, n)),
+        stiffness=np.zeros((m, m)),
+        joint_from_base=np.zeros((nv, n)),
+        gravity=np.zeros(n),
+        M_inverse=np.zeros((nv, nv)),
+        P=np.zeros((nv, nv)),
+        square_v=np.zeros((nv, nv)),
+        square_n=np.zeros((3, n, n)),
+        square_c=np.zeros((4, c, c)),
+        square_m=np.zeros((5, m, m)),
+        wide_c=np.zeros((2, c, nv)),
+        wide_m=np.zeros((2, m, nv)),
+        tall_n=np.zeros((nv, n)),
+        values=np.zeros(max(n, c, m, 1)),
+    )
+
+
+@njit(cache=True)
+def _subtract_projection(P, X, inverse, scratch):
+    """P ← P − Xᵀ A⁺ X with X (k, nv), A⁺ (k, k) and scratch (k, nv)."""
+    multiply(inverse, X, scratch)
+    k, nv = X.shape
+    for r in range(k):
+        for i in range(nv):
+            x = X[r, i]
+            if x != 0.0:
+                for j in range(nv):
+                    P[i, j] -= x * scratch[r, j]
+
+
+@njit(cache=True)
+def _constrain(M, J_s, tolerance, space):
+    """P = N_s M⁻¹, the inverse inertia that the contacts leave; False if M is not positive."""
+    if not invert_spd(M, space.M_inverse, space.square_v):
+        return False
+    P = space.P
+    P[:, :] = space.M_inverse
+    if J_s.shape[0] == 0:
+        return True
+    X, scratch = space.wide_c[0], space.wide_c[1]
+    A, A_inverse, root, vectors = (
+        space.square_c[0],
+        space.square_c[1],
+        space.square_c[2],
+        space.square_c[3],
+    )
+    multiply(J_s, P, X)
+    multiply_transposed(X, J_s, A)
+    threshold = tolerance * np.trace(A)
+    pseudo_inverse_psd(A, threshold, A_inverse, root, space.values, vectors)
+    _subtract_projection(P, X, A_inverse, scratch)
+    return True
+
+
+@njit(cache=True)
+def _stiffness_block(form, K, Lambda, root, scratch, out):
+    """The task stiffness of one level: Λ^½ K Λ^½, Λ K, or K."""
+    if form == SYMMETRIC:
+        multiply(K, root, scratch)
+        multiply(root, scratch, out)
+    elif form == PUBLISHED:
+        multiply(Lambda, K, out)
+    else:
+        out[:, :] = K
+
+
+@njit(cache=True)
+def operational_space(M, g, J_s, J_t, K_x, levels, form, tolerance, space):
+    """Fill ``space`` at one instant, Eqs. (10), (11) with Sentis' recursive null spaces.
+
+    P_1 = N_s M⁻¹,  φ* = U P_1 Uᵀ,  and for each level k:  Λ_k = (J_k P_k J_kᵀ)⁺,
+    J*_k = J_k P_k Uᵀ φ*⁺,  P_{k+1} = P_k − P_k J_kᵀ Λ_k J_k P_k.
+
+    Args:
+        M: (nv, nv) mass matrix.
+        g: (nv,) gravity torque.
+        J_s: (c, nv) contact Jacobian, c may be 0.
+        J_t: (m, nv) task Jacobians, levels below one another.
+        K_x: (m, m) task stiffness, blocks of the levels on the diagonal.
+        levels: (k + 1,) first row of each level, then m.
+        form: SYMMETRIC, PUBLISHED or FORCE.
+        tolerance: a direction counts as lost where its mobility is below this fraction of the
+            mobility (trace) that the task has without contacts and higher levels.
+        space: arrays from `allocate`.
+
+    Returns:
+        False if M is not positive definite; the arrays are then without meaning.
+    """
+    if not _constrain(M, J_s, tolerance, space):
+        return False
+    nv = M.shape[0]
+    n = space.gravity.shape[0]
+    base = nv - n
+    P = space.P
+    phi, phi_inverse, vectors = space.square_n[0], space.square_n[1], space.square_n[2]
+    scale = 0.0
+    for i in range(n):
+        scale += space.M_inverse[base + i, base + i]
+        for j in range(n):
+            phi[i, j] = P[base + i, base + j]
+    root = space.joint_from_base[:n]
+    pseudo_inverse_psd(phi, tolerance * scale, phi_inverse, root, space.values, vectors)
+    for i in range(nv):
+        for j in range(n):
+            space.tall_n[i, j] = P[i, base + j]
+    multiply(space.tall_n, phi_inverse, space.joint_from_base)
+    for j in range(n):
+        total = 0.0
+        for i in range(nv):
+            total += space.joint_from_base[i, j] * g[i]
+        space.gravity[j] = total
+    space.stiffness[:, :] = 0.0
+    for k in range(len(levels) - 1):
+        _level(J_t, K_x, levels[k], levels[k + 1], form, tolerance, phi_inverse, space)
+    return True
+
+
+@njit(cache=True)
+def _mobility(J, M_inverse):
+    """trace(J M⁻¹ Jᵀ): the scale against which a lost direction is small."""
+    total = 0.0
+    for r in range(J.shape[0]):
+        for i in range(J.shape[1]):
+            if J[r, i] != 0.0:
+                for j in range(J.shape[1]):
+                    total += J[r, i] * M_inverse[i, j] * J[r, j]
+    return total
+
+
+@njit(cache=True)
+def _level(J_t, K_x, first, last, form, tolerance, phi_inverse, space):
+    """One priority level: J*, its stiffness, and what is left for the next level."""
+    size = last - first
+    if size == 0:
+        return
+    P = space.P
+    nv, n = space.joint_from_base.shape
+    base = nv - n
+    X, scratch = space.wide_m[0][:size], space.wide_m[1][:size]
+    multiply(J_t[first:last], P, X)
+    H = space.square_m[0].ravel()[: size * size].reshape(size, size)
+    Lambda = space.square_m[1].ravel()[: size * size].reshape(size, size)
+    root = space.square_m[2].ravel()[: size * size].reshape(size, size)
+    vectors = space.square_m[3].ravel()[: size * size].reshape(size, size)
+    block = space.square_m[4].ravel()[: size * size].reshape(size, size)
+    multiply_transposed(X, J_t[first:last], H)
+    threshold = tolerance * _mobility(J_t[first:last], space.M_inverse)
+    pseudo_inverse_psd(H, threshold, Lambda, root, space.values, vectors)
+    for r in range(size):
+        for j in range(n):
+            total = 0.0
+            for p in range(n):
+                total += X[r, base + p] * phi_inverse[p, j]
+            space.J_star[first + r, j] = total
+    K = K_x[first:last, first:last]
+    for i in range(size):
+        for j in range(size):
+            vectors[i, j] = K[i, j]
+    _stiffness_block(form, vectors, Lambda, root, H, block)
+    for i in range(size):
+        for j in range(size):
+            space.stiffness[first + i, first + j] = block[i, j]
+    _subtract_projection(P, X, Lambda, scratch)
+
+
+@njit(cache=True)
+def task_torque(J_star, stiffness, error, gravity, out):
+    """out = J*ᵀ S error + gravity, Eqs. (11), (17)."""
+    m, n = J_star.shape
+    for j in range(n):
+        out[j] = gravity[j]
+    for r in range(m):
+        force = 0.0
+        for s in range(m):
+            force += stiffness[r, s] * error[s]
+        for j in range(n):
+            out[j] += J_star[r, j] * force
+
+
+def warm() -> None:
+    """Compile every kernel of this module."""
+    space = allocate(2, 1, 1, m=1)
+    operational_space(
+        np.eye(2),
+        np.zeros(2),
+        np.array([[1.0, 0.5]]),
+        np.array([[0.0, 1.0]]),
+        np.eye(1),
+        np.array([0, 1]),
+        SYMMETRIC,
+        1e-10,
+        space,
+    )
+    task_torque(space.J_star, space.stiffness, np.zeros(1), space.gravity, np.zeros(1))

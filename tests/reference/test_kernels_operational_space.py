@@ -1,0 +1,129 @@
+"""The compiled operational space against its plain NumPy twin."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from sealag.kernels.dense import invert_spd, jacobi_eigh, pseudo_inverse_psd
+from sealag.kernels.operational_space import (
+    FORCE,
+    PUBLISHED,
+    SYMMETRIC,
+    allocate,
+    operational_space,
+    task_torque,
+)
+
+TOLERANCE = 1e-10
+
+
+def plain_space(M, g, J_s, J_t, K_x, *, levels, form, n):
+    """Eqs. (10), (11) with null-space projectors written out as in the paper."""
+    nv = len(M)
+    U = np.hstack([np.zeros((n, nv - n)), np.eye(n)])
+    Mi = np.linalg.inv(M)
+
+    def pinv(A, scale):
+        w, V = np.linalg.eigh(A)
+        keep = w > TOLERANCE * np.trace(scale)
+        return (V[:, keep] / w[keep]) @ V[:, keep].T
+
+    A_s = J_s @ Mi @ J_s.T
+    J_bar = Mi @ J_s.T @ pinv(A_s, A_s)
+    N_s = np.eye(nv) - J_bar @ J_s
+    UN = U @ N_s
+    UN_bar = Mi @ UN.T @ pinv(UN @ Mi @ UN.T, U @ Mi @ U.T)
+    N = N_s
+    J_star, blocks = [], []
+    for first, last in itertools.pairwise(levels):
+        J = J_t[first:last] @ N
+        Lambda = pinv(J @ Mi @ J.T, J_t[first:last] @ Mi @ J_t[first:last].T)
+        J_star.append(J @ UN_bar)
+        K = K_x[first:last, first:last]
+        w, V = np.linalg.eigh(Lambda)
+        root = V @ np.diag(np.sqrt(np.clip(w, 0, None))) @ V.T
+        blocks.append({SYMMETRIC: root @ K @ root, PUBLISHED: Lambda @ K, FORCE: K}[form])
+        N = N - Mi @ J.T @ Lambda @ J
+    S = np.zeros_like(K_x)
+    for (first, last), block in zip(itertools.pairwise(levels), blocks, strict=True):
+        S[first:last, first:last] = block
+    return np.vstack(J_star), S, UN_bar, UN_bar.T @ g
+
+
+CASES = [
+    # nv, n, contact rows, levels, copies of contact rows
+    (12, 6, 3, [0, 6], 0),
+    (12, 6, 3, [0, 3, 6], 0),
+    (18, 12, 12, [0, 6, 18], 0),
+    (18, 12, 12, [0, 3, 6, 9], 3),
+    (7, 7, 0, [0, 6, 13], 0),
+    (12, 6, 0, [0, 6], 0),
+]
+
+
+@pytest.mark.parametrize("form", [SYMMETRIC, PUBLISHED, FORCE])
+@pytest.mark.parametrize("case", CASES)
+def test_matches_projectors_written_out(case, form):
+    nv, n, c, levels, copies = case
+    rng = np.random.default_rng(nv * 100 + c + form)
+    X = rng.normal(size=(nv, nv))
+    M = X @ X.T + np.eye(nv)
+    J_s = rng.normal(size=(c, nv))
+    if copies:
+        J_s[-copies:] = J_s[:copies]
+    m = levels[-1]
+    J_t, g = rng.normal(size=(m, nv)), rng.normal(size=nv)
+    K_x = np.diag(rng.uniform(1, 100, m))
+    space = allocate(nv, n, c, m=m)
+    assert operational_space(M, g, J_s, J_t, K_x, np.array(levels), form, TOLERANCE, space)
+    J_star, S, UN_bar, gravity = plain_space(M, g, J_s, J_t, K_x, levels=levels, form=form, n=n)
+    np.testing.assert_allclose(space.J_star, J_star, atol=1e-8 * np.abs(J_star).max())
+    np.testing.assert_allclose(space.joint_from_base, UN_bar, atol=1e-8 * np.abs(UN_bar).max())
+    np.testing.assert_allclose(space.gravity, gravity, atol=1e-8 * np.abs(gravity).max())
+    F, F_plain = J_star.T @ S @ J_star, space.J_star.T @ space.stiffness @ space.J_star
+    np.testing.assert_allclose(F_plain, F, atol=1e-6 * np.abs(F).max())
+    error, out = rng.normal(size=m), np.zeros(n)
+    task_torque(space.J_star, space.stiffness, error, space.gravity, out)
+    expected = J_star.T @ S @ error + gravity
+    np.testing.assert_allclose(out, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_says_no_to_an_indefinite_mass_matrix():
+    space = allocate(2, 1, 0, m=1)
+    M = np.array([[1.0, 2.0], [2.0, 1.0]])
+    args = (np.zeros(2), np.zeros((0, 2)), np.ones((1, 2)), np.eye(1), np.array([0, 1]))
+    assert not operational_space(M, *args, SYMMETRIC, TOLERANCE, space)
+
+
+@pytest.mark.parametrize("rank", [0, 1, 4, 6])
+def test_pseudo_inverse_and_root(rank):
+    rng = np.random.default_rng(rank)
+    X = rng.normal(size=(6, rank))
+    A = X @ X.T
+    out, root = np.zeros((6, 6)), np.zeros((6, 6))
+    found = pseudo_inverse_psd(A.copy(), 1e-10, out, root, np.zeros(6), np.zeros((6, 6)))
+    assert found == rank
+    expected = np.linalg.pinv(A, rcond=1e-10, hermitian=True)
+    np.testing.assert_allclose(out, expected, atol=1e-9 * max(1.0, np.abs(expected).max()))
+    np.testing.assert_allclose(root @ root, out, atol=1e-9 * max(1.0, np.abs(out).max()))
+
+
+def test_eigenvectors_of_repeated_eigenvalues():
+    rng = np.random.default_rng(5)
+    Q, _ = np.linalg.qr(rng.normal(size=(8, 8)))
+    A = Q @ np.diag([1.0, 1, 1, 2, 2, 1e-8, 1e6, 1e6]) @ Q.T
+    A = (A + A.T) / 2
+    values, vectors = np.zeros(8), np.zeros((8, 8))
+    jacobi_eigh(A.copy(), values, vectors)
+    np.testing.assert_allclose(vectors.T @ vectors, np.eye(8), atol=1e-13)
+    np.testing.assert_allclose(vectors @ np.diag(values) @ vectors.T, A, atol=1e-8)
+
+
+def test_cholesky_inverse_and_its_refusal():
+    rng = np.random.default_rng(6)
+    X = rng.normal(size=(5, 5))
+    A, out = X @ X.T + np.eye(5), np.zeros((5, 5))
+    assert invert_spd(A, out, np.zeros((5, 5)))
+    np.testing.assert_allclose(out @ A, np.eye(5), atol=1e-12)
+    assert not invert_spd(-A, out, np.zeros((5, 5)))
