@@ -1,0 +1,343 @@
+"""Motor kernels: one series elastic joint moved exactly over a step, and its works.
+
+A joint's vector z (9,) is [theta, theta_dot, motor torque state, q, q̇, q̈, q⃛, u, w]: link motion
+is a cubic over the step, u is the held command, w a constant torque on the rotor. z obeys
+ż = A z, so z and the integrals of products of its entries follow from exponentials alone.
+
+``parameters`` (n, 10) columns: K, D_s, B, B / B_s, D_theta, viscous friction, Coulomb friction,
+torque limit, velocity limit, torque bandwidth (rad/s, inf if ideal). ``instant`` is 1.0 if the
+embedded torque feedback is not delayed.
+
+Works (n, 7): ∫θ̇², ∫τ_sea q̇, ∫τ_sea θ̇, ∫(θ̇ − q̇)², ∫τ_m θ̇, ∫|θ̇| (Coulomb), ∫τ_osc θ̇.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+SIZE = 9
+PRODUCTS = 5
+REGULAR, LIMITED, LOCKED = 0, 1, 2  # LOCKED adds to the other two
+_TERMS = 12
+
+
+@njit(cache=True)
+def generator(p, instant, variant, A, Q):
+    """Write A (9, 9) and the five product forms Q (5, 9, 9) of a joint in a variant."""
+    K, D_s, B, ratio, D_theta, viscous = p[0], p[1], p[2], p[3], p[4], p[5]
+    bandwidth = p[9]
+    A[:] = 0.0
+    A[3, 4] = A[4, 5] = A[5, 6] = 1.0
+    spring = np.zeros(SIZE)
+    spring[0], spring[3], spring[1], spring[4] = K, -K, D_s, -D_s
+    command = np.zeros(SIZE)
+    if variant % 2 == LIMITED:
+        command[7] = 1.0
+    else:
+        command[7] = ratio
+        command[1] = -ratio * D_theta
+        command += instant * (1.0 - ratio) * spring
+    torque = command
+    if bandwidth != np.inf:
+        A[2] = bandwidth * command
+        A[2, 2] -= bandwidth
+        torque = np.zeros(SIZE)
+        torque[2] = 1.0
+    if variant < LOCKED:
+        A[0, 1] = 1.0
+        A[1] = (torque - spring) / B
+        A[1, 1] -= viscous / B
+        A[1, 8] += 1.0 / B
+    speed = np.zeros(SIZE)
+    speed[1] = 1.0
+    link = np.zeros(SIZE)
+    link[4] = 1.0
+    _product(speed, speed, Q[0])
+    _product(spring, link, Q[1])
+    _product(spring, speed, Q[2])
+    _product(speed - link, speed - link, Q[3])
+    _product(torque, speed, Q[4])
+
+
+@njit(cache=True)
+def _product(a, b, Q):
+    for i in range(SIZE):
+        for j in range(SIZE):
+            Q[i, j] = 0.5 * (a[i] * b[j] + a[j] * b[i])
+
+
+@njit(cache=True)
+def _multiply(X, Y, out):
+    for i in range(SIZE):
+        for j in range(SIZE):
+            out[i, j] = 0.0
+        for k in range(SIZE):
+            x = X[i, k]
+            if x != 0.0:
+                for j in range(SIZE):
+                    out[i, j] += x * Y[k, j]
+
+
+@njit(cache=True)
+def _halvings(A, time):
+    norm = 0.0
+    for j in range(SIZE):
+        s = 0.0
+        for i in range(SIZE):
+            s += abs(A[i, j])
+        norm = max(norm, s)
+    return max(0, int(math.ceil(math.log2(max(norm * time, 1e-30) / 0.25))))
+
+
+@njit(cache=True)
+def exponential(A, time, E):
+    """Write e^{A time} by scaling, Taylor series and squaring."""
+    halvings = _halvings(A, time)
+    t = time / 2.0**halvings
+    term = np.eye(SIZE)
+    other = np.empty((SIZE, SIZE))
+    E[:] = np.eye(SIZE)
+    for k in range(1, _TERMS + 1):
+        _multiply(term, A, other)
+        term[:] = other * (t / k)
+        E += term
+    for _ in range(halvings):
+        _multiply(E, E, other)
+        E[:] = other
+
+
+@njit(cache=True)
+def advance(A, Q, time, E, W):
+    """Write E = e^{A time} and W_k = ∫₀^time e^{Aᵀs} Q_k e^{As} ds for the five forms."""
+    halvings = _halvings(A, time)
+    t = time / 2.0**halvings
+    other = np.empty((SIZE, SIZE))
+    half = np.empty((SIZE, SIZE))
+    exponential(A, t, E)
+    At = A.T.copy()
+    for k in range(PRODUCTS):
+        form = Q[k].copy()
+        weight = t
+        W[k] = form * weight
+        for j in range(1, _TERMS + 1):
+            _multiply(At, form, other)
+            _multiply(form, A, half)
+            form[:] = other + half
+            weight *= t / (j + 1)
+            W[k] += form * weight
+    for _ in range(halvings):
+        Et = E.T.copy()
+        for k in range(PRODUCTS):
+            _multiply(W[k], E, half)
+            _multiply(Et, half, other)
+            W[k] += other
+        _multiply(E, E, other)
+        E[:] = other
+
+
+@njit(cache=True)
+def tables(parameters, instant, step, half_step, whole_step, works):
+    """Fill exponentials over half and whole steps (n, 4, 9, 9) and forms (n, 4, 5, 9, 9)."""
+    A = np.empty((SIZE, SIZE))
+    Q = np.empty((PRODUCTS, SIZE, SIZE))
+    for i in range(parameters.shape[0]):
+        for variant in range(4):
+            generator(parameters[i], instant, variant, A, Q)
+            exponential(A, 0.5 * step, half_step[i, variant])
+            advance(A, Q, step, whole_step[i, variant], works[i, variant])
+
+
+@njit(cache=True)
+def spring_torque(p, z):
+    """Return tau_sea = K (theta - q) + D_s (theta_dot - q_dot) of one joint."""
+    return p[0] * (z[0] - z[3]) + p[1] * (z[1] - z[4])
+
+
+@njit(cache=True)
+def choose(p, instant, tau_osc, tau_measured, z):
+    """Set u and w of a joint for what lies ahead; return variant and direction of motion."""
+    ratio, coulomb = p[3], p[6]
+    spring = spring_torque(p, z)
+    shift = 0.0
+    if instant == 0.0:
+        shift = (1.0 - ratio) / ratio * tau_measured
+    z[7] = tau_osc + shift
+    command = ratio * (z[7] - p[4] * z[1]) + instant * (1.0 - ratio) * spring
+    upper = p[7] if z[1] < p[8] else 0.0
+    lower = -p[7] if z[1] > -p[8] else 0.0
+    variant = REGULAR
+    if command > upper or command < lower:
+        variant = LIMITED
+        command = min(max(command, lower), upper)
+        z[7] = command
+    z[8] = 0.0
+    direction = 0.0
+    if coulomb > 0.0:
+        torque = command if p[9] == np.inf else z[2]
+        net = torque - spring
+        if z[1] == 0.0 and abs(net) <= coulomb:
+            variant += LOCKED
+        else:
+            direction = math.copysign(1.0, z[1] if z[1] != 0.0 else net)
+            z[8] = -direction * coulomb
+    if p[9] == np.inf:
+        z[2] = command
+    return variant, direction
+
+
+@njit(cache=True)
+def _apply(E, z, out):
+    for i in range(SIZE):
+        s = 0.0
+        for j in range(SIZE):
+            s += E[i, j] * z[j]
+        out[i] = s
+
+
+@njit(cache=True)
+def _reversal(A, z, direction, time, E, out):
+    """Return the instant in (0, time) at which the speed passes through zero (Illinois)."""
+    low, high = 0.0, time
+    f_low = direction * z[1]
+    _apply_after(A, z, time, E, out)
+    f_high = direction * out[1]
+    for _ in range(30):
+        middle = (low * f_high - high * f_low) / (f_high - f_low)
+        _apply_after(A, z, middle, E, out)
+        f = direction * out[1]
+        if abs(f) < 1e-13 or high - low < 1e-13 * time:
+            return middle
+        if f < 0.0:
+            high, f_high = middle, f
+            f_low *= 0.5
+        else:
+            low, f_low = middle, f
+            f_high *= 0.5
+    return 0.5 * (low + high)
+
+
+@njit(cache=True)
+def _apply_after(A, z, time, E, out):
+    exponential(A, time, E)
+    _apply(E, z, out)
+
+
+@njit(cache=True)
+def predict(parameters, instant, tau_osc, tau_measured, z, step, half_step, regular, out):
+    """Motor angle and speed half a step and a step ahead, out (n, 2, 2); z is not moved."""
+    A = np.empty((SIZE, SIZE))
+    Q = np.empty((PRODUCTS, SIZE, SIZE))
+    E = np.empty((SIZE, SIZE))
+    now = np.empty(SIZE)
+    then = np.empty(SIZE)
+    for i in range(parameters.shape[0]):
+        now[:] = z[i]
+        variant, _ = choose(parameters[i], instant, tau_osc[i], tau_measured[i], now)
+        if regular:
+            _apply(half_step[i, variant], now, then)
+            out[i, 0, 0], out[i, 0, 1] = then[0], then[1]
+            _apply(half_step[i, variant], then, now)
+        else:
+            generator(parameters[i], instant, variant, A, Q)
+            exponential(A, 0.5 * step, E)
+            _apply(E, now, then)
+            out[i, 0, 0], out[i, 0, 1] = then[0], then[1]
+            _apply(E, then, now)
+        out[i, 1, 0], out[i, 1, 1] = now[0], now[1]
+
+
+@njit(cache=True)
+def link_cubic(z, q_0, v_0, q_1, v_1, step):
+    """Set the cubic link motion of every joint through both ends of the step."""
+    for i in range(z.shape[0]):
+        rise = q_1[i] - q_0[i] - step * v_0[i]
+        turn = v_1[i] - v_0[i]
+        z[i, 3], z[i, 4] = q_0[i], v_0[i]
+        z[i, 5] = 6.0 * rise / step**2 - 2.0 * turn / step
+        z[i, 6] = 6.0 * turn / step**2 - 12.0 * rise / step**3
+
+
+@njit(cache=True)
+def move(parameters, instant, tau_osc, tau_measured, z, step, tables_E, tables_W, regular, work):
+    """Move every joint over the step along its link's cubic; add to its works (n, 7)."""
+    A = np.empty((SIZE, SIZE))
+    Q = np.empty((PRODUCTS, SIZE, SIZE))
+    E = np.empty((SIZE, SIZE))
+    W = np.empty((PRODUCTS, SIZE, SIZE))
+    after = np.empty(SIZE)
+    for i in range(parameters.shape[0]):
+        left = step
+        whole = regular
+        for _ in range(8):
+            p = parameters[i]
+            variant, direction = choose(p, instant, tau_osc[i], tau_measured[i], z[i])
+            if whole:
+                E[:] = tables_E[i, variant]
+                W[:] = tables_W[i, variant]
+            else:
+                generator(p, instant, variant, A, Q)
+                advance(A, Q, left, E, W)
+            _apply(E, z[i], after)
+            span = left
+            reversing = direction != 0.0 and after[1] * direction < 0.0
+            if reversing:
+                if z[i, 1] == 0.0:
+                    variant = variant % 2 + LOCKED
+                    z[i, 8] = 0.0
+                    generator(p, instant, variant, A, Q)
+                    reversing = False
+                else:
+                    generator(p, instant, variant, A, Q)
+                    span = _reversal(A, z[i], direction, left, E, after)
+                advance(A, Q, span, E, W)
+                _apply(E, z[i], after)
+            for k in range(PRODUCTS):
+                s = 0.0
+                for a in range(SIZE):
+                    for b in range(SIZE):
+                        s += z[i, a] * W[k, a, b] * z[i, b]
+                work[i, k] += s
+            travel = after[0] - z[i, 0]
+            work[i, 5] += abs(travel)
+            work[i, 6] += tau_osc[i] * travel
+            z[i] = after
+            if reversing:
+                z[i, 1] = 0.0
+            if not reversing or left - span <= 1e-12 * step:
+                break
+            left -= span
+            whole = False
+        choose(parameters[i], instant, tau_osc[i], tau_measured[i], z[i])
+
+
+@njit(cache=True)
+def stores(parameters, z, q, kinetic, gravity, out):
+    """Write kinetic, gravity, spring and motor energy (4,); link angles are q's last entries."""
+    n = parameters.shape[0]
+    out[0], out[1], out[2], out[3] = kinetic, gravity, 0.0, 0.0
+    for i in range(n):
+        stretch = z[i, 0] - q[q.size - n + i]
+        out[2] += 0.5 * parameters[i, 0] * stretch * stretch
+        out[3] += 0.5 * parameters[i, 2] * z[i, 1] * z[i, 1]
+
+
+@njit(cache=True)
+def tally(parameters, work, powers, step, z, q, kinetic, gravity, joint, scalar, energy, moved):
+    """Add one step to the ledger: joint works, Runge-Kutta integrals of powers, store changes."""
+    for i in range(parameters.shape[0]):
+        joint[0, i] += work[i, 1]
+        joint[1, i] += work[i, 2]
+        joint[2, i] += work[i, 4]
+        joint[3, i] += work[i, 6]
+        joint[4, i] += parameters[i, 4] * work[i, 0]
+        joint[5, i] += parameters[i, 5] * work[i, 0]
+        joint[6, i] += parameters[i, 6] * work[i, 5]
+        joint[7, i] += parameters[i, 1] * work[i, 3]
+    for k in range(4):
+        mean = powers[0, k] + 2.0 * (powers[1, k] + powers[2, k]) + powers[3, k]
+        scalar[k] += step / 6.0 * mean
+    before = energy.copy()
+    stores(parameters, z, q, kinetic, gravity, energy)
+    for k in range(4):
+        moved[0] += abs(energy[k] - before[k])

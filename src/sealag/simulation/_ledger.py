@@ -1,0 +1,76 @@
+"""The plant's books: what every mechanism has done so far, added up step by step."""
+
+import numpy as np
+
+from sealag.simulation._instant import Instant
+from sealag.typing import Array
+
+STORES = ("kinetic", "gravity", "spring", "motor")
+JOINT_FLOWS = (
+    "port",  # ∫ tau_sea q̇: springs to links
+    "shaft",  # ∫ tau_sea θ̇: motors to springs
+    "motor_work",  # ∫ tau_m θ̇
+    "command",  # ∫ tau_osc θ̇
+    "damping",  # ∫ D_theta θ̇²
+    "viscous",
+    "coulomb",
+    "spring_damping",
+)
+SCALAR_FLOWS = ("holding", "sliding", "torsion", "disturbance", "impact")
+
+
+class Ledger:
+    """Cumulative works since the beginning of a run, J.
+
+    Attributes:
+        joint: Rows as in JOINT_FLOWS (8, n).
+        scalar: As in SCALAR_FLOWS (5,); the first four are works done on the robot, impact is lost.
+        stores: Energies at the present instant as in STORES (4,).
+        first: Energies at the beginning (4,).
+        throughput: Sum of the absolute changes of the stores, J.
+    """
+
+    def __init__(self, parameters: Array) -> None:
+        from sealag.kernels.motor import stores, tally
+
+        self._tally, self._stores, self._parameters = tally, stores, parameters
+        n = parameters.shape[0]
+        self.joint, self.scalar = np.zeros((len(JOINT_FLOWS), n)), np.zeros(len(SCALAR_FLOWS))
+        self.stores, self.first = np.zeros(4), np.zeros(4)
+        self._moved = np.zeros(1)
+
+    @property
+    def throughput(self) -> float:
+        """Energy moved between stores so far, J."""
+        return float(self._moved[0])
+
+    @property
+    def residual(self) -> float:
+        """Energy present minus energy expected from all works, J: zero but for the integrator."""
+        port_in = self.joint[2].sum() - self.joint[5:].sum()
+        return float(self.stores.sum() - self.first.sum() - port_in - self._outside())
+
+    def _outside(self) -> float:
+        return float(self.scalar[:4].sum() - self.scalar[4])
+
+    def begin(self, at: Instant) -> None:
+        """Open empty books at an instant."""
+        self.joint[:] = 0.0
+        self.scalar[:] = 0.0
+        self._moved[:] = 0.0
+        self._stores(self._parameters, at.z, at.q, at.power[4], at.potential, self.stores)
+        self.first[:] = self.stores
+
+    def add(self, work: Array, powers: Array, step: float, at: Instant) -> None:
+        """Book one step: joint works (n, 7), stage powers (4, 5), and the stores after it."""
+        self._tally(
+            self._parameters, work, powers, step, at.z, at.q, at.power[4], at.potential,
+            self.joint, self.scalar, self.stores, self._moved,
+        )  # fmt: skip
+
+    def strike(self, lost: float, at: Instant) -> None:
+        """Book an impact: what its impulses took, and the stores after it."""
+        self.scalar[4] += lost
+        before = self.stores.copy()
+        self._stores(self._parameters, at.z, at.q, at.power[4], at.potential, self.stores)
+        self._moved += np.abs(self.stores - before).sum()

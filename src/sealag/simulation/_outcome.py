@@ -1,0 +1,40 @@
+"""How a run ends: a named result, never an exception of linear algebra."""
+
+from enum import StrEnum
+
+
+class Outcome(StrEnum):
+    """How a simulated run ended."""
+
+    COMPLETED = "completed"
+    """The whole duration was simulated."""
+    FELL = "fell"
+    """The base tilted or sank beyond the posture limits."""
+    DIVERGED = "diverged"
+    """A velocity or spring deflection left any physical range, or a number was not finite."""
+    CONTACT_UNSOLVABLE = "contact_unsolvable"
+    """No set of contact forces satisfies the contact conditions in this state."""
+    CHATTERED = "chattered"
+    """Contacts opened and closed too often within one step."""
+    CONTROLLER_FAILED = "controller_failed"
+    """The controller raised one of sealag's errors or commanded a number that is not finite."""
+    INTERRUPTED = "interrupted"
+    """The user stopped the run; what was simulated until then is complete."""
+
+
+class EventKind(StrEnum):
+    """What happened at a contact point, located inside a step."""
+
+    TOUCHDOWN = "touchdown"
+    LIFT_OFF = "lift_off"
+    SLIP = "slip"
+    STICK = "stick"
+
+
+class PlantStop(Exception):  # noqa: N818 - not an error: the plant's way out of a step
+    """Ends a step that cannot be completed; carries the outcome and a sentence."""
+
+    def __init__(self, outcome: Outcome, message: str) -> None:
+        super().__init__(message)
+        self.outcome = outcome
+        self.message = message

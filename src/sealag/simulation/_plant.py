@@ -1,0 +1,370 @@
+"""The robot with springs on its ground, moved by one step of exactly known error.
+
+Link side: classical fourth-order Runge-Kutta in exponential coordinates about the step's start.
+Motor side: exact along the link's cubic motion. Changes of contact are located inside the step to
+rounding and end it there, so that the order survives them; torque and velocity limits, Coulomb
+stick and changes of applied forces act from the beginning of a step.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.actuation import Actuators
+from sealag.errors import InputError
+from sealag.robot import Robot
+from sealag.simulation._contacts import MARGIN, OPEN, SLIP, STICK, Contacts
+from sealag.simulation._ground import FlatGround, Foot, Ground
+from sealag.simulation._instant import Instant
+from sealag.simulation._ledger import Ledger
+from sealag.simulation._outcome import EventKind, Outcome, PlantStop
+from sealag.typing import Array, IntArray
+
+_EVENTS_PER_STEP = 60
+_LOCATE = 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactEvent:
+    """A change of contact, located inside a step.
+
+    Attributes:
+        time: When it happened, s.
+        kind: What happened.
+        foot: Frame of the foot.
+        point: Number of the contact point.
+        impulse: Contact impulse in the contact frame (3,), Ns; zero but at a touchdown.
+    """
+
+    time: float
+    kind: EventKind
+    foot: str
+    point: int
+    impulse: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Plant:
+    """A robot with series elastic actuators on a ground; owns its state and moves it.
+
+    Args:
+        robot: The rigid bodies.
+        actuators: Springs and motors, in the robot's joint order.
+        step: Length of a step, s.
+        feet: What may touch the ground.
+        ground: Where the ground is.
+        loaded_frames: Frames on which disturbing forces may act.
+        delayed_torque_feedback: The embedded torque feedback uses a measurement that is held over
+            the step (and late) instead of the present spring torque.
+        stabilisation: Rate at which contacts return to where they closed, 1/s.
+
+    Raises:
+        InputError: The step is not a positive time, or the joints do not match.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        actuators: Actuators,
+        *,
+        step: float,
+        feet: Sequence[Foot] = (),
+        ground: Ground | None = None,
+        loaded_frames: Sequence[str] = (),
+        delayed_torque_feedback: bool = False,
+        stabilisation: float = 50.0,
+    ) -> None:
+        from sealag.kernels import contact, motor, rigid
+
+        if not (np.isfinite(step) and step > 0):
+            raise InputError(f"the step must be a time > 0 s, got {step}")
+        if tuple(actuators.joints) != tuple(robot.joints):
+            raise InputError(
+                f"actuators are for joints {list(actuators.joints)}, "
+                f"the robot has {list(robot.joints)}"
+            )
+        self._rigid, self._motor, self._contact_kernel = rigid, motor, contact
+        self.robot, self.actuators, self.step_length = robot, actuators, step
+        self.contacts = Contacts(
+            robot, feet, ground or FlatGround(), loaded_frames, stabilisation=stabilisation
+        )
+        n, nv, count = robot.n, robot.nv, self.contacts.count
+        self.time = 0.0
+        self._base = robot.nv_base
+        self._parameters = actuator_parameters(actuators)
+        self._spring = (
+            np.ascontiguousarray(self._parameters[:, 0]),
+            np.ascontiguousarray(self._parameters[:, 1]),
+        )
+        self._instant = 0.0 if delayed_torque_feedback else 1.0
+        self._tables = (
+            np.empty((n, 4, 9, 9)),
+            np.empty((n, 4, 9, 9)),
+            np.empty((n, 4, 5, 9, 9)),
+        )
+        motor.tables(self._parameters, self._instant, step, *self._tables)
+        self._now, self._next, self._stage = (
+            Instant(robot, self.contacts.total, count) for _ in range(3)
+        )
+        self._rates, self._accelerations = np.zeros((4, nv)), np.zeros((4, nv))
+        self._powers = np.zeros((4, 5))
+        self._ahead, self._u = np.zeros((n, 2, 2)), np.zeros(nv)
+        self._middle, self._end = self._ahead[:, 0].copy(), self._ahead[:, 1].copy()
+        self._work = np.zeros((n, 7))
+        self.load = np.zeros((len(loaded_frames), 3))
+        self.ledger = Ledger(self._parameters)
+        self.impulse = np.zeros((count, 3))
+        self.events: list[ContactEvent] = []
+
+    # State -------------------------------------------------------------------------------------
+    def start(
+        self, q: Array, v: Array, *, theta: Array | None = None, theta_dot: Array | None = None
+    ) -> None:
+        """Set the state at time 0 and close the contacts that touch.
+
+        Args:
+            q: Configuration (nq,).
+            v: Velocity (nv,).
+            theta: Motor angles (n,), rad; default the link angles (springs at rest).
+            theta_dot: Motor speeds (n,), rad/s; default the joint rates.
+
+        Raises:
+            InputError: A foot begins inside the ground, or no contact forces can hold the state.
+        """
+        now, n = self._now, self.robot.n
+        now.q[:], now.v[:] = q, v
+        now.z[:] = 0.0
+        now.z[:, 0] = now.q[-n:] if theta is None else theta
+        now.z[:, 1] = now.v[-n:] if theta_dot is None else theta_dot
+        self.time = 0.0
+        self.events.clear()
+        self.contacts.open_all()
+        self._evaluate(now)
+        self.contacts.refuse_buried(now)
+        self.contacts.measure_gaps(now)
+        try:
+            self._touch(now, self.contacts.touching(now, tolerance=1e-4))
+        except PlantStop as stop:
+            raise InputError(f"the run cannot begin: {stop.message}") from None
+        self.ledger.begin(now)
+
+    @property
+    def q(self) -> Array:
+        """Configuration (nq,)."""
+        return self._now.q
+
+    @property
+    def v(self) -> Array:
+        """Velocity (nv,)."""
+        return self._now.v
+
+    @property
+    def theta(self) -> Array:
+        """Motor angles (n,), rad."""
+        return self._now.z[:, 0]
+
+    @property
+    def theta_dot(self) -> Array:
+        """Motor speeds (n,), rad/s."""
+        return self._now.z[:, 1]
+
+    @property
+    def motor_torque(self) -> Array:
+        """Torque of the motors (n,), Nm."""
+        return self._now.z[:, 2]
+
+    @property
+    def tau_sea(self) -> Array:
+        """Spring torques (n,), Nm."""
+        return self._now.tau
+
+    @property
+    def force(self) -> Array:
+        """Contact forces in their contact frames (P, 3), N."""
+        return self._now.force
+
+    @property
+    def instant(self) -> Instant:
+        """Everything known about the present instant."""
+        return self._now
+
+    # Motion ------------------------------------------------------------------------------------
+    def step(self, tau_osc: Array, tau_measured: Array | None = None) -> None:
+        """Move by one step under a held command.
+
+        Args:
+            tau_osc: Command as it reached the motors (n,), Nm.
+            tau_measured: Spring torque as it reached the embedded controller (n,), Nm; used only
+                with ``delayed_torque_feedback``.
+
+        Raises:
+            PlantStop: The step cannot be completed; the state is that of the last good instant.
+        """
+        measured = self._now.tau if tau_measured is None else tau_measured
+        left, regular = self.step_length, True
+        for _ in range(_EVENTS_PER_STEP):
+            self.contacts.remember()
+            self._try(left, regular, tau_osc, measured)
+            margin, point = self.contacts.margin(self._next)
+            if margin >= -MARGIN:
+                self._accept(left)
+                return
+            done, point = self._locate(left, margin, point, tau_osc, measured)
+            self._accept(done)
+            self._change(point)
+            left -= done
+            regular = False
+            if left <= 1e-9 * self.step_length:
+                return
+        raise PlantStop(
+            Outcome.CHATTERED,
+            f"contacts changed more than {_EVENTS_PER_STEP} times in one step at t = "
+            f"{self.time:.4f} s",
+        )
+
+    def _try(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
+        """Fill the next instant with the state one step ahead in the present contact modes."""
+        rigid, now, nxt, stage = self._rigid, self._now, self._next, self._stage
+        base, n = self._base, self.robot.n
+        z = nxt.z
+        z[:] = now.z
+        z[:, 3], z[:, 4] = now.q[-n:], now.v[-n:]
+        z[:, 5], z[:, 6] = now.acceleration[-n:], 0.0
+        self._motor.predict(
+            self._parameters, self._instant, tau_osc, measured, z, step, self._tables[0],
+            regular, self._ahead,
+        )  # fmt: skip
+        self._middle[:], self._end[:] = self._ahead[:, 0], self._ahead[:, 1]
+        self._rates[0], self._accelerations[0] = now.v, now.acceleration
+        self._powers[0] = now.power
+        for k in (1, 2, 3):
+            rigid.stage(
+                now.q, now.v, self._rates[k - 1], self._accelerations[k - 1],
+                step if k == 3 else 0.5 * step, base, self._u, stage.q, stage.v, self._rates[k],
+            )  # fmt: skip
+            self._evaluate(stage, self._end if k == 3 else self._middle)
+            self._accelerations[k] = stage.acceleration
+            self._powers[k] = stage.power
+        rigid.combine(now.q, now.v, self._rates, self._accelerations, step, base, nxt.q, nxt.v)
+        self._motor.link_cubic(z, now.q[-n:], now.v[-n:], nxt.q[-n:], nxt.v[-n:], step)
+        self._work[:] = 0.0
+        self._motor.move(
+            self._parameters, self._instant, tau_osc, measured, z, step, self._tables[1],
+            self._tables[2], regular, self._work,
+        )  # fmt: skip
+        self._evaluate(nxt)
+        self.contacts.measure_gaps(nxt)
+
+    def _evaluate(self, at: Instant, motor: Array | None = None) -> None:
+        contacts = self.contacts
+        contacts.body.evaluate(at)
+        solved = self._contact_kernel.evaluate(
+            at.M, at.nle, contacts.body.frames, at.v, at.q[-self.robot.n :],
+            at.z[:, :2] if motor is None else motor, self._spring, contacts.shape,
+            contacts.ground_arrays, contacts.stabilisation, contacts.state, self.load,
+            contacts.torsion, at.solved,
+        )  # fmt: skip
+        if not solved:
+            raise PlantStop(
+                Outcome.DIVERGED if not np.isfinite(at.q).all() else Outcome.CONTACT_UNSOLVABLE,
+                f"the equations of motion have no solution after t = {self.time:.4f} s",
+            )
+
+    def _accept(self, step: float) -> None:
+        self._now, self._next = self._next, self._now
+        self.ledger.add(self._work, self._powers, step, self._now)
+        self.time += step
+
+    # Contact changes ---------------------------------------------------------------------------
+    def _locate(
+        self, step: float, f_high: float, point: int, tau_osc: Array, measured: Array
+    ) -> tuple[float, int]:
+        """Shorten the step to where the first margin vanishes (Illinois); return length, point."""
+        low, high, middle = 0.0, step, step
+        f_low = max(self.contacts.margin(self._now)[0], MARGIN)
+        side = 0
+        for _ in range(_LOCATE):
+            middle = (low * f_high - high * f_low) / (f_high - f_low)
+            self.contacts.recall()
+            self._try(middle, False, tau_osc, measured)
+            value, at = self.contacts.margin(self._next)
+            point = at if value < MARGIN else point
+            if abs(value) <= MARGIN or high - low <= 1e-9 * self.step_length:
+                break
+            if value < 0:
+                high, f_high = middle, value
+                f_low = 0.5 * f_low if side == -1 else f_low
+                side = -1
+            else:
+                low, f_low = middle, value
+                f_high = 0.5 * f_high if side == 1 else f_high
+                side = 1
+        return middle, point
+
+    def _change(self, point: int) -> None:
+        """Let a contact point change at the present instant, where its margin has vanished."""
+        now, contacts = self._now, self.contacts
+        before = contacts.mode.copy()
+        if before[point] == OPEN:
+            self._touch(now, contacts.touching(now))
+        else:
+            if before[point] == SLIP and contacts.halted(now, point):
+                contacts.close(now, point)
+                self._strike(now, (contacts.mode != OPEN).astype(np.int64))
+            contacts.settle(now, contacts.touching(now))
+            self._evaluate(now)
+            contacts.measure_gaps(now)
+        self._report(before)
+
+    def _touch(self, now: Instant, mask: IntArray) -> None:
+        """Close every masked point by a plastic impact, then find which contacts hold."""
+        for point in np.flatnonzero((mask == 1) & (self.contacts.mode == OPEN)):
+            self.contacts.close(now, int(point))
+        if mask.any():
+            self._strike(now, mask)
+            self.contacts.settle(now, self.contacts.touching(now))
+            self._evaluate(now)
+        self.contacts.measure_gaps(now)
+
+    def _strike(self, now: Instant, mask: IntArray) -> None:
+        speed, impulse = self.contacts.strike(now, mask)
+        mean = 0.5 * np.einsum("pab,b->pa", now.J[: self.contacts.count], now.v + speed)
+        mean = np.einsum("pab,pb->pa", self.contacts.C, mean)
+        now.v[:] = speed
+        self.impulse[:] = impulse
+        self._evaluate(now)
+        self.ledger.strike(-float((mean * impulse).sum()), now)
+
+    def _report(self, before: Array) -> None:
+        kinds = {OPEN: EventKind.LIFT_OFF, STICK: EventKind.STICK, SLIP: EventKind.SLIP}
+        after = self.contacts.mode
+        for point in np.flatnonzero(before != after):
+            kind = EventKind.TOUCHDOWN if before[point] == OPEN else kinds[int(after[point])]
+            hit = kind == EventKind.TOUCHDOWN
+            x, y, z = self.impulse[point].tolist() if hit else (0.0, 0.0, 0.0)
+            self.events.append(
+                ContactEvent(
+                    time=self.time,
+                    kind=kind,
+                    foot=self.contacts.feet[self.contacts.foot_of[point]].contact.frame,
+                    point=int(point),
+                    impulse=(x, y, z),
+                )
+            )
+
+
+def actuator_parameters(actuators: Actuators) -> Array:
+    """Return the motor kernels' parameters (n, 10) of a set of actuators."""
+    columns = [
+        actuators.spring_stiffness,
+        actuators.spring_damping,
+        actuators.rotor_inertia,
+        actuators.rotor_inertia / actuators.shaped_inertia,
+        actuators.motor_damping,
+        actuators.viscous_friction,
+        actuators.coulomb_friction,
+        actuators.torque_limit,
+        actuators.velocity_limit,
+        actuators.torque_bandwidth,
+    ]
+    return np.ascontiguousarray(np.stack(columns, axis=1), dtype=float)
