@@ -1,1 +1,1 @@
-"""sealag.data."""
+"""Bundled robots and project files; no code."""

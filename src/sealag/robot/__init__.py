@@ -1,1 +1,22 @@
-"""sealag.robot."""
+"""Robots from URDF: configurations, dynamics, frames and contacts. The only room with Pinocchio."""
+
+from sealag.robot._contact import Contact, ContactKind, Motion
+from sealag.robot._load import bundled_robot_path, example_robot_path, resolve_urdf
+from sealag.robot._robot import Robot, load_robot
+from sealag.robot._stack import Stack, TermRows, stack_terms
+from sealag.robot._workspace import Workspace
+
+__all__ = [
+    "Contact",
+    "ContactKind",
+    "Motion",
+    "Robot",
+    "Stack",
+    "TermRows",
+    "Workspace",
+    "bundled_robot_path",
+    "example_robot_path",
+    "load_robot",
+    "resolve_urdf",
+    "stack_terms",
+]

@@ -1,0 +1,357 @@
+"""The robot: names, limits, configurations and its dynamics at one configuration."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from sealag.errors import InputError, RobotError
+from sealag.robot._contact import Contact
+from sealag.robot._load import near, read_model, reduce_model, resolve_urdf
+from sealag.robot._workspace import Workspace
+from sealag.typing import Array, ArrayLike
+
+_UNLIMITED = 1e8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robot:
+    """A floating- or fixed-base robot whose actuated joints have one degree of freedom each.
+
+    A configuration is [base position, base quaternion x y z w, joints], a velocity [linear,
+    angular velocity of the base in its own frame, joint rates]; without a floating base only the
+    joints. The selection matrix is U = [0 I]: torques act on the last n velocities.
+
+    Attributes:
+        name: the URDF's robot name.
+        urdf_path: the file it was read from.
+        urdf_sha256: the file's SHA-256.
+        floating_base: whether the root link moves freely.
+        joints: (n) names of the actuated joints, in the order of all arrays.
+        position_lower: (n,) rad or m, -inf where there is none.
+        position_upper: (n,) rad or m, inf where there is none.
+        velocity_limit: (n,) rad/s or m/s, inf where there is none.
+        effort_limit: (n,) Nm or N, inf where there is none.
+        rotor_inertia: (n,) reflected rotor inertia that the URDF states, else 0, kg m².
+        mass: total mass, kg.
+    """
+
+    name: str
+    urdf_path: Path
+    urdf_sha256: str
+    floating_base: bool
+    joints: tuple[str, ...]
+    position_lower: Array
+    position_upper: Array
+    velocity_limit: Array
+    effort_limit: Array
+    rotor_inertia: Array
+    mass: float
+    _model: Any = field(repr=False)
+    _scratch: list[Workspace] = field(default_factory=list, repr=False, compare=False)
+
+    @property
+    def n(self) -> int:
+        """Number of actuated joints."""
+        return len(self.joints)
+
+    @property
+    def nv_base(self) -> int:
+        """Number of base velocities: 6 or 0."""
+        return 6 if self.floating_base else 0
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return self.nv_base + self.n
+
+    @property
+    def nq(self) -> int:
+        """Number of configuration entries."""
+        return self.n + (7 if self.floating_base else 0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave scratch memory out of a pickle."""
+        names = [name for name in self.__slots__ if name != "_scratch"]
+        return {name: getattr(self, name) for name in names}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore from a pickle."""
+        for name, value in {**state, "_scratch": []}.items():
+            object.__setattr__(self, name, value)
+
+    def workspace(self) -> Workspace:
+        """Return new memory for repeated evaluation, one for each thread."""
+        return Workspace(self._model, nv_base=self.nv_base)
+
+    def _at(self, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
+        if not self._scratch:
+            self._scratch.append(self.workspace())
+        q = self._checked(q, self.nq, "configuration")
+        v = np.zeros(self.nv) if v is None else self._checked(v, self.nv, "velocity")
+        self._scratch[0].update(q, v)
+        return self._scratch[0]
+
+    def _checked(self, values: ArrayLike, length: int, what: str) -> Array:
+        array = np.ascontiguousarray(values, dtype=float)
+        if array.shape != (length,):
+            raise InputError(
+                f"A {what} of {self.name} has {length} numbers; the one given has shape "
+                f"{array.shape}."
+            )
+        if not np.isfinite(array).all():
+            raise InputError(f"The {what} of {self.name} has entries that are not finite.")
+        return array
+
+    def joint_index(self, name: str) -> int:
+        """Return the place of a joint in arrays of length n.
+
+        Args:
+            name: an actuated joint.
+
+        Raises:
+            UnknownNameError: there is no such joint.
+        """
+        if name not in self.joints:
+            raise near(name, self.joints, what=f"actuated joint of {self.name}")
+        return self.joints.index(name)
+
+    def neutral(self) -> Array:
+        """Return the configuration (nq,) with all joints at 0 and the base at the origin."""
+        return self.configuration(np.zeros(self.n))
+
+    def configuration(
+        self,
+        joints: Mapping[str, float] | ArrayLike,
+        *,
+        base_position: ArrayLike = (0.0, 0.0, 0.0),
+        base_quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0),
+    ) -> Array:
+        """Build a configuration.
+
+        Args:
+            joints: positions by name (others are 0) or (n,) in the order of `joints`, rad or m.
+            base_position: (3,) m in the world; ignored without a floating base.
+            base_quaternion: (4,) x, y, z, w; it is normalised.
+
+        Returns:
+            (nq,) configuration.
+
+        Raises:
+            UnknownNameError: a joint does not exist.
+            InputError: lengths are wrong, values are not finite, or the quaternion is 0.
+        """
+        if isinstance(joints, Mapping):
+            positions = np.zeros(self.n)
+            for name, value in joints.items():
+                positions[self.joint_index(name)] = value
+        else:
+            positions = self._checked(joints, self.n, "joint position")
+        if not self.floating_base:
+            return self._checked(positions, self.nq, "configuration")
+        quaternion = np.asarray(base_quaternion, dtype=float)
+        norm = np.linalg.norm(quaternion)
+        if quaternion.shape != (4,) or not norm > 1e-6:
+            raise InputError(f"The base quaternion {base_quaternion} is not one; x, y, z, w.")
+        base = np.asarray(base_position, dtype=float)
+        return self._checked(
+            np.concatenate([base, quaternion / norm, positions]), self.nq, "configuration"
+        )
+
+    def joint_positions(self, q: ArrayLike) -> Array:
+        """Return the joints' part (…, n) of configurations.
+
+        Args:
+            q: (…, nq).
+        """
+        return np.asarray(q, dtype=float)[..., self.nq - self.n :]
+
+    def integrate(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Move a configuration along a tangent vector.
+
+        Args:
+            q: (nq,).
+            v: (nv,) velocity times time.
+        """
+        return pin.integrate(
+            self._model, self._checked(q, self.nq, "configuration"), np.asarray(v, float)
+        )
+
+    def difference(self, q_from: ArrayLike, q_to: ArrayLike) -> Array:
+        """Return the tangent vector (nv,) that leads from one configuration to another.
+
+        Args:
+            q_from: (nq,).
+            q_to: (nq,).
+        """
+        return pin.difference(self._model, np.asarray(q_from, float), np.asarray(q_to, float))
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Return M(q) (nv, nv) of Eq. (4), without rotor inertia.
+
+        Args:
+            q: (nq,).
+        """
+        return self._at(q).M.copy()
+
+    def nonlinear_effects(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Return h(q, v) (nv,) of Eq. (4): Coriolis, centrifugal and gravity torques.
+
+        Args:
+            q: (nq,).
+            v: (nv,).
+        """
+        return self._at(q, v).nle.copy()
+
+    def gravity(self, q: ArrayLike) -> Array:
+        """Return the gravity torque g(q) (nv,).
+
+        Args:
+            q: (nq,).
+        """
+        return self._at(q).gravity().copy()
+
+    def gravity_gradient(self, q: ArrayLike) -> Array:
+        """Return ∂g/∂q (nv, nv), a derivative along tangent directions.
+
+        Args:
+            q: (nq,).
+        """
+        data = self._model.createData()
+        return pin.computeGeneralizedGravityDerivatives(
+            self._model, data, self._checked(q, self.nq, "configuration")
+        ).copy()
+
+    def center_of_mass(self, q: ArrayLike) -> Array:
+        """Return the centre of mass (3,) in the world, m.
+
+        Args:
+            q: (nq,).
+        """
+        return self._at(q).com.copy()
+
+    def com_jacobian(self, q: ArrayLike) -> Array:
+        """Return the Jacobian (3, nv) of the centre of mass.
+
+        Args:
+            q: (nq,).
+        """
+        return self._at(q).com_jacobian().copy()
+
+    def frame_names(self) -> tuple[str, ...]:
+        """Return the names of all frames: links and joints."""
+        return tuple(frame.name for frame in self._model.frames)
+
+    def check_frame(self, frame: str) -> str:
+        """Return the name of a frame if it exists.
+
+        Args:
+            frame: the name.
+
+        Raises:
+            UnknownNameError: there is no such frame.
+        """
+        if not self._model.existFrame(frame):
+            raise near(frame, self.frame_names(), what=f"frame of {self.name}")
+        return frame
+
+    def frame_placement(self, frame: str, q: ArrayLike) -> tuple[Array, Array]:
+        """Return a frame's rotation (3, 3) and position (3,) in the world.
+
+        Args:
+            frame: its name.
+            q: (nq,).
+        """
+        rotation, position = self._at(q).frame_placement(self.check_frame(frame))
+        return rotation.copy(), position.copy()
+
+    def frame_jacobian(self, frame: str, q: ArrayLike) -> Array:
+        """Return a frame's Jacobian (6, nv): linear then angular velocity, axes of the world.
+
+        Args:
+            frame: its name.
+            q: (nq,).
+        """
+        return self._at(q).frame_jacobian(self.check_frame(frame)).copy()
+
+    def contact_jacobian(self, contacts: Sequence[Contact], q: ArrayLike) -> Array:
+        """Return J_s (c, nv), the contacts' rows below one another.
+
+        Args:
+            contacts: which frames are held.
+            q: (nq,).
+        """
+        at = self._at(q)
+        rows = [at.frame_jacobian(self.check_frame(c.frame))[: c.kind.rows] for c in contacts]
+        return np.vstack(rows) if rows else np.zeros((0, self.nv))
+
+    def contact_bias(self, contacts: Sequence[Contact], q: ArrayLike, v: ArrayLike) -> Array:
+        """Return J̇_s v (c,), the contacts' accelerations at zero joint acceleration.
+
+        Args:
+            contacts: which frames are held.
+            q: (nq,).
+            v: (nv,).
+        """
+        at = self._at(q, v)
+        rows = [at.frame_bias(self.check_frame(c.frame))[: c.kind.rows] for c in contacts]
+        return np.concatenate(rows) if rows else np.zeros(0)
+
+
+def load_robot(
+    urdf: str | Path,
+    *,
+    floating_base: bool,
+    actuated: Sequence[str] | None = None,
+) -> Robot:
+    """Read a robot from a URDF; meshes are not needed.
+
+    Args:
+        urdf: a path, `bundled:hume.urdf`, or `example-robot-data:<path below robots>`.
+        floating_base: whether the root link moves freely.
+        actuated: names of the actuated joints; the other movable joints are locked at their
+            neutral position. None takes all.
+
+    Returns:
+        The robot; its `joints` are in the model's order, whatever the order of `actuated`.
+
+    Raises:
+        FileError: the file cannot be read.
+        RobotError: it is not a URDF of a robot with mass and one-degree-of-freedom joints.
+        UnknownNameError: an actuated joint or a bundled robot does not exist.
+    """
+    path = resolve_urdf(str(urdf))
+    model, digest = read_model(path, floating_base=floating_base)
+    model = reduce_model(model, path, actuated=actuated)
+    names = tuple(name for name in model.names[1:] if name != "root_joint")
+    mass = float(sum(inertia.mass for inertia in model.inertias))
+    n = len(names)
+    if model.nq != n + (7 if floating_base else 0):
+        raise RobotError(f"{path}: a joint's position is not one number; that is not supported.")
+    return Robot(
+        name=model.name,
+        urdf_path=path,
+        urdf_sha256=digest,
+        floating_base=floating_base,
+        joints=names,
+        position_lower=_limit(model.lowerPositionLimit[-n:], below=True),
+        position_upper=_limit(model.upperPositionLimit[-n:]),
+        velocity_limit=_limit(model.velocityLimit[-n:]),
+        effort_limit=_limit(model.effortLimit[-n:]),
+        rotor_inertia=np.array(model.armature[-n:], dtype=float),
+        mass=mass,
+        _model=model,
+    )
+
+
+def _limit(values: Array, *, below: bool = False) -> Array:
+    """Limits as the URDF gives them; absent, zero (not given) or huge ones are infinite."""
+    array = np.array(values, dtype=float)
+    if below:
+        array[~(np.abs(array) < _UNLIMITED)] = -np.inf
+    else:
+        array[~(np.abs(array) < _UNLIMITED)] = np.inf
+    return array
