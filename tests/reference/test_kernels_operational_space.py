@@ -18,7 +18,7 @@ from sealag.kernels.operational_space import (
 TOLERANCE = 1e-10
 
 
-def plain_space(M, g, J_s, J_t, K_x, *, levels, form, n):
+def plain_space(M, g, J_s, J_t, K_x, *, levels, form, n, star):
     """Eqs. (10), (11) with null-space projectors written out as in the paper."""
     nv = len(M)
     U = np.hstack([np.zeros((n, nv - n)), np.eye(n)])
@@ -40,11 +40,14 @@ def plain_space(M, g, J_s, J_t, K_x, *, levels, form, n):
         J = J_t[first:last] @ N
         Lambda = pinv(J @ Mi @ J.T, J_t[first:last] @ Mi @ J_t[first:last].T)
         J_star.append(J @ UN_bar)
+        N = N - Mi @ J.T @ Lambda @ J
+        if star:
+            unconstrained = J_t[first:last] @ Mi @ J_t[first:last].T
+            Lambda = pinv(J_star[-1] @ (UN @ Mi @ UN.T) @ J_star[-1].T, unconstrained)
         K = K_x[first:last, first:last]
         w, V = np.linalg.eigh(Lambda)
         root = V @ np.diag(np.sqrt(np.clip(w, 0, None))) @ V.T
         blocks.append({SYMMETRIC: root @ K @ root, PUBLISHED: Lambda @ K, FORCE: K}[form])
-        N = N - Mi @ J.T @ Lambda @ J
     S = np.zeros_like(K_x)
     for (first, last), block in zip(itertools.pairwise(levels), blocks, strict=True):
         S[first:last, first:last] = block
@@ -62,9 +65,10 @@ CASES = [
 ]
 
 
+@pytest.mark.parametrize("star", [False, True])
 @pytest.mark.parametrize("form", [SYMMETRIC, PUBLISHED, FORCE])
 @pytest.mark.parametrize("case", CASES)
-def test_matches_projectors_written_out(case, form):
+def test_matches_projectors_written_out(case, form, star):
     nv, n, c, levels, copies = case
     rng = np.random.default_rng(nv * 100 + c + form)
     X = rng.normal(size=(nv, nv))
@@ -76,8 +80,10 @@ def test_matches_projectors_written_out(case, form):
     J_t, g = rng.normal(size=(m, nv)), rng.normal(size=nv)
     K_x = np.diag(rng.uniform(1, 100, m))
     space = allocate(nv, n, c, m=m)
-    assert operational_space(M, g, J_s, J_t, K_x, np.array(levels), form, TOLERANCE, space)
-    J_star, S, UN_bar, gravity = plain_space(M, g, J_s, J_t, K_x, levels=levels, form=form, n=n)
+    assert operational_space(M, g, J_s, J_t, K_x, np.array(levels), form, star, TOLERANCE, space)
+    J_star, S, UN_bar, gravity = plain_space(
+        M, g, J_s, J_t, K_x, levels=levels, form=form, n=n, star=star
+    )
     np.testing.assert_allclose(space.J_star, J_star, atol=1e-8 * np.abs(J_star).max())
     np.testing.assert_allclose(space.joint_from_base, UN_bar, atol=1e-8 * np.abs(UN_bar).max())
     np.testing.assert_allclose(space.gravity, gravity, atol=1e-8 * np.abs(gravity).max())
@@ -93,7 +99,7 @@ def test_says_no_to_an_indefinite_mass_matrix():
     space = allocate(2, 1, 0, m=1)
     M = np.array([[1.0, 2.0], [2.0, 1.0]])
     args = (np.zeros(2), np.zeros((0, 2)), np.ones((1, 2)), np.eye(1), np.array([0, 1]))
-    assert not operational_space(M, *args, SYMMETRIC, TOLERANCE, space)
+    assert not operational_space(M, *args, SYMMETRIC, False, TOLERANCE, space)
 
 
 @pytest.mark.parametrize("rank", [0, 1, 4, 6])

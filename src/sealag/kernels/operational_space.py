@@ -18,13 +18,14 @@ class Space(NamedTuple):
     """
 
     J_star: Array  # (m, n)
-    stiffness: Array  # (m, m), blocks of the levels on the diagonal
+    Lambda: Array  # (m, m), blocks of the levels on the diagonal
+    stiffness: Array  # (m, m), likewise
     joint_from_base: Array  # (nv, n): dynamically consistent inverse of U N_s
     gravity: Array  # (n,) compensation torque
     M_inverse: Array  # (nv, nv)
     P: Array  # (nv, nv)
     square_v: Array  # (nv, nv)
-    square_n: Array  # (3, n, n)
+    square_n: Array  # (4, n, n)
     square_c: Array  # (4, c, c)
     square_m: Array  # (5, m, m)
     wide_c: Array  # (2, c, nv)
@@ -44,13 +45,14 @@ def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
     """
     return Space(
         J_star=np.zeros((m, n)),
+        Lambda=np.zeros((m, m)),
         stiffness=np.zeros((m, m)),
         joint_from_base=np.zeros((nv, n)),
         gravity=np.zeros(n),
         M_inverse=np.zeros((nv, nv)),
         P=np.zeros((nv, nv)),
         square_v=np.zeros((nv, nv)),
-        square_n=np.zeros((3, n, n)),
+        square_n=np.zeros((4, n, n)),
         square_c=np.zeros((4, c, c)),
         square_m=np.zeros((5, m, m)),
         wide_c=np.zeros((2, c, nv)),
@@ -110,7 +112,7 @@ def _stiffness_block(form, K, Lambda, root, scratch, out):
 
 
 @njit(cache=True)
-def operational_space(M, g, J_s, J_t, K_x, levels, form, tolerance, space):
+def operational_space(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space):
     """Fill ``space`` at one instant, Eqs. (10), (11) with Sentis' recursive null spaces.
 
     P_1 = N_s M⁻¹,  φ* = U P_1 Uᵀ,  and for each level k:  Λ_k = (J_k P_k J_kᵀ)⁺,
@@ -124,6 +126,7 @@ def operational_space(M, g, J_s, J_t, K_x, levels, form, tolerance, space):
         K_x: (m, m) task stiffness, blocks of the levels on the diagonal.
         levels: (k + 1,) first row of each level, then m.
         form: SYMMETRIC, PUBLISHED or FORCE.
+        star: whether stiffness uses Λ*_k = (J*_k φ* J*_kᵀ)⁺ instead of Λ_k.
         tolerance: a direction counts as lost where its mobility is below this fraction of the
             mobility (trace) that the task has without contacts and higher levels.
         space: arrays from `allocate`.
@@ -138,13 +141,15 @@ def operational_space(M, g, J_s, J_t, K_x, levels, form, tolerance, space):
     base = nv - n
     P = space.P
     phi, phi_inverse, vectors = space.square_n[0], space.square_n[1], space.square_n[2]
+    work = space.square_n[3]
     scale = 0.0
     for i in range(n):
         scale += space.M_inverse[base + i, base + i]
         for j in range(n):
             phi[i, j] = P[base + i, base + j]
+            work[i, j] = phi[i, j]
     root = space.joint_from_base[:n]
-    pseudo_inverse_psd(phi, tolerance * scale, phi_inverse, root, space.values, vectors)
+    pseudo_inverse_psd(work, tolerance * scale, phi_inverse, root, space.values, vectors)
     for i in range(nv):
         for j in range(n):
             space.tall_n[i, j] = P[i, base + j]
@@ -154,9 +159,10 @@ def operational_space(M, g, J_s, J_t, K_x, levels, form, tolerance, space):
         for i in range(nv):
             total += space.joint_from_base[i, j] * g[i]
         space.gravity[j] = total
+    space.Lambda[:, :] = 0.0
     space.stiffness[:, :] = 0.0
     for k in range(len(levels) - 1):
-        _level(J_t, K_x, levels[k], levels[k + 1], form, tolerance, phi_inverse, space)
+        _level(J_t, K_x, levels[k], levels[k + 1], form, star, tolerance, space)
     return True
 
 
@@ -173,12 +179,12 @@ def _mobility(J, M_inverse):
 
 
 @njit(cache=True)
-def _level(J_t, K_x, first, last, form, tolerance, phi_inverse, space):
+def _level(J_t, K_x, first, last, form, star, tolerance, space):
     """One priority level: J*, its stiffness, and what is left for the next level."""
     size = last - first
     if size == 0:
         return
-    P = space.P
+    P, phi_inverse = space.P, space.square_n[1]
     nv, n = space.joint_from_base.shape
     base = nv - n
     X, scratch = space.wide_m[0][:size], space.wide_m[1][:size]
@@ -197,6 +203,12 @@ def _level(J_t, K_x, first, last, form, tolerance, phi_inverse, space):
             for p in range(n):
                 total += X[r, base + p] * phi_inverse[p, j]
             space.J_star[first + r, j] = total
+    _subtract_projection(P, X, Lambda, scratch)
+    if star:
+        J_phi = X.ravel()[: size * n].reshape(size, n)
+        multiply(space.J_star[first:last], space.square_n[0], J_phi)
+        multiply_transposed(J_phi, space.J_star[first:last], H)
+        pseudo_inverse_psd(H, threshold, Lambda, root, space.values, vectors)
     K = K_x[first:last, first:last]
     for i in range(size):
         for j in range(size):
@@ -205,7 +217,34 @@ def _level(J_t, K_x, first, last, form, tolerance, phi_inverse, space):
     for i in range(size):
         for j in range(size):
             space.stiffness[first + i, first + j] = block[i, j]
-    _subtract_projection(P, X, Lambda, scratch)
+            space.Lambda[first + i, first + j] = Lambda[i, j]
+
+
+@njit(cache=True)
+def operational_spaces(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space, out):
+    """`operational_space` at N instants, one after the other.
+
+    Args:
+        M: (N, nv, nv); g: (N, nv); J_s: (N, c, nv); J_t: (N, m, nv).
+        K_x: as in `operational_space`, with levels, form, star, tolerance and space.
+        out: J_star (N, m, n), Lambda (N, m, m), stiffness (N, m, m), joint_from_base
+            (N, nv, n), gravity (N, n), all written.
+
+    Returns:
+        The first instant at which M is not positive definite, or -1.
+    """
+    J_star, Lambda, stiffness, joint_from_base, gravity = out
+    for k in range(M.shape[0]):
+        if not operational_space(
+            M[k], g[k], J_s[k], J_t[k], K_x, levels, form, star, tolerance, space
+        ):
+            return k
+        J_star[k] = space.J_star
+        Lambda[k] = space.Lambda
+        stiffness[k] = space.stiffness
+        joint_from_base[k] = space.joint_from_base
+        gravity[k] = space.gravity
+    return -1
 
 
 @njit(cache=True)
@@ -233,7 +272,27 @@ def warm() -> None:
         np.eye(1),
         np.array([0, 1]),
         SYMMETRIC,
+        False,
         1e-10,
         space,
+    )
+    operational_spaces(
+        np.eye(2)[None],
+        np.zeros((1, 2)),
+        np.array([[[1.0, 0.5]]]),
+        np.array([[[0.0, 1.0]]]),
+        np.eye(1),
+        np.array([0, 1]),
+        SYMMETRIC,
+        False,
+        1e-10,
+        space,
+        (
+            np.zeros((1, 1, 1)),
+            np.zeros((1, 1, 1)),
+            np.zeros((1, 1, 1)),
+            np.zeros((1, 2, 1)),
+            np.zeros((1, 1)),
+        ),
     )
     task_torque(space.J_star, space.stiffness, np.zeros(1), space.gravity, np.zeros(1))

@@ -8,6 +8,7 @@ import numpy as np
 from sealag.errors import InputError
 from sealag.robot._contact import Contact
 from sealag.robot._robot import Robot
+from sealag.robot._workspace import Workspace
 from sealag.typing import Array, ArrayLike
 
 
@@ -16,12 +17,26 @@ class TermRows:
     """Rows of a task Jacobian that a stack shall hold.
 
     Attributes:
-        frame: the frame's name, or None for the centre of mass.
-        rows: which of the six rows (linear, then angular; three for the centre of mass).
+        frame: the frame's name, or None for the centre of mass or joints.
+        rows: which of the six rows (linear, then angular; three for the centre of mass); for
+            joints, their places in `Robot.joints`.
+        of_joints: whether the rows are joint rates.
     """
 
     frame: str | None
     rows: tuple[int, ...]
+    of_joints: bool = False
+
+    def take(self, at: Workspace) -> Array:
+        """Return the rows (k, nv) at the workspace's configuration.
+
+        Args:
+            at: an updated workspace.
+        """
+        if self.of_joints:
+            return np.eye(at.nv)[[at.nv_base + row for row in self.rows]]
+        full = at.com_jacobian() if self.frame is None else at.frame_jacobian(self.frame)
+        return full[list(self.rows)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +89,6 @@ def stack_terms(
         J_t=np.zeros((count, m, nv)),
     )
     at, rest = robot.workspace(), np.zeros(nv)
-    picks = [(row.frame, list(row.rows)) for row in rows]
     for k in range(count):
         at.update(q[k], rest)
         stack.M[k] = at.M
@@ -85,9 +99,8 @@ def stack_terms(
             stack.J_s[k, first:last] = at.frame_jacobian(contact.frame)[: contact.kind.rows]
             first = last
         first = 0
-        for frame, pick in picks:
-            last = first + len(pick)
-            jacobian = at.com_jacobian() if frame is None else at.frame_jacobian(frame)
-            stack.J_t[k, first:last] = jacobian[pick]
+        for row in rows:
+            last = first + len(row.rows)
+            stack.J_t[k, first:last] = row.take(at)
             first = last
     return stack

@@ -14,6 +14,10 @@ class Workspace:
     """All terms of a robot at one configuration and velocity; `update` first, then read.
 
     Arrays are views of memory that the next `update` overwrites: copy what must last.
+
+    Attributes:
+        nv: number of velocities.
+        nv_base: number of base velocities, 6 or 0.
     """
 
     def __init__(self, model: Any, *, nv_base: int) -> None:
@@ -27,9 +31,9 @@ class Workspace:
         self._data = model.createData()
         self._zero = np.zeros(model.nv)
         self._frames: dict[str, int] = {}
-        self._nv_base = nv_base
+        self.nv = int(model.nv)
+        self.nv_base = nv_base
         self._q = pin.neutral(model)
-        self._jacobian = np.zeros((6, model.nv), order="F")
 
     def update(self, q: Array, v: Array) -> None:
         """Evaluate everything at a configuration and velocity.

@@ -23,7 +23,7 @@ class Body:
     def __init__(self, robot: Robot, names: Sequence[str]) -> None:
         count = len(names)
         self._workspace = robot.workspace()
-        self._names = tuple(names)
+        self._names = tuple(robot.check_frame(name) for name in names)
         self.frames = (
             np.zeros((count, 6, robot.nv)),
             np.zeros((count, 3, 3)),
@@ -33,3 +33,13 @@ class Body:
 
     def evaluate(self, at: Instant) -> None:
         """Evaluate at an instant's q and v."""
+        workspace = self._workspace
+        workspace.update(at.q, at.v)
+        at.M[:] = workspace.M
+        at.nle[:] = workspace.nle
+        at.potential = workspace.potential_energy
+        jacobian, rotation, position, bias = self.frames
+        for i, name in enumerate(self._names):
+            rotation[i], position[i] = workspace.frame_placement(name)
+            jacobian[i] = workspace.frame_jacobian(name)
+            bias[i] = workspace.frame_bias(name)

@@ -138,6 +138,12 @@ class Contacts:
         self.anchor[point] = at.position[point]
         self.mode[point] = STICK
 
+    def loaded(self) -> Array:
+        """Return 1.0 for every foot that has a closed point (F,)."""
+        flags = np.zeros(len(self.feet))
+        flags[self.foot_of[self.mode != OPEN]] = 1.0
+        return flags
+
     def halted(self, at: Instant, point: int) -> bool:
         """Tell whether a sliding point has come to rest, not only turned."""
         tangent = self.C[point, :2] @ at.velocity[point]
