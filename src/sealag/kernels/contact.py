@@ -1,7 +1,13 @@
-"""Contact kernels: point kinematics, constrained dynamics, and which contacts hold.
+"""Contact kernels: point kinematics, friction, constrained dynamics, which contacts hold.
 
 Every foot is one or several points. A point's contact frame C has rows tangent, tangent, normal;
-forces and impulses are given in it. Modes are those of ``kernels.rigid``: OPEN, STICK, SLIP.
+forces and impulses are given in it. A closed point has no normal acceleration (but for the return
+to where it closed) and Coulomb friction in the form
+
+    w = v_t + T a_t,   |f_t| <= mu f_n,   w = 0 or f_t = -mu f_n w / |w|,
+
+so that a point sticks whenever friction can stop it within the time T, and slides against the
+velocity that it is about to have. The law is continuous; T is the step, and 0 is Coulomb's law.
 """
 
 import math
@@ -9,18 +15,11 @@ import math
 import numpy as np
 from numba import njit
 
-from sealag.kernels.rigid import (
-    _REST,
-    OPEN,
-    SLIP,
-    STICK,
-    _backward,
-    _eliminate,
-    _forward,
-    cholesky,
-)
+from sealag.kernels.rigid import _backward, _forward, cholesky
 
 _RIDGE = 1e-11  # relative diagonal that shares force between redundant points
+_CONE = 1e-10  # relative accuracy of the friction cone
+_ITERATIONS = 60
 
 
 @njit(cache=True)
@@ -63,17 +62,23 @@ def points(J_frame, R, p, drift_frame, v, frame_of, offset, J, position, velocit
 
 
 @njit(cache=True)
-def demand(C, position, anchor, velocity, drift, gain, out):
-    """Write J̇v + 2 gain v + gain² (p - anchor) of every point in its contact frame (P, 3)."""
+def demand(C, position, anchor, velocity, drift, gain, stop_time, out):
+    """Write the part of every point's contact equation that is not J x (P, 3).
+
+    Tangent rows: J̇v + v_t / stop_time. Normal row: J̇v + 2 gain v_n + gain² (p - anchor)_n.
+    """
     for i in range(C.shape[0]):
         for a in range(3):
             s = 0.0
             for b in range(3):
-                s += C[i, a, b] * (
-                    drift[i, b]
-                    + 2.0 * gain * velocity[i, b]
-                    + gain * gain * (position[i, b] - anchor[i, b])
-                )
+                if a < 2:
+                    s += C[i, a, b] * (drift[i, b] + velocity[i, b] / stop_time)
+                else:
+                    s += C[i, a, b] * (
+                        drift[i, b]
+                        + 2.0 * gain * velocity[i, b]
+                        + gain * gain * (position[i, b] - anchor[i, b])
+                    )
             out[i, a] = s
 
 
@@ -91,129 +96,138 @@ def project(L, J, C, rows):
 
 
 @njit(cache=True)
-def solve(L, rows, free, target, mode, slide, mu, x, force):
-    """Meet the contact conditions of the given modes.
-
-    ``free`` (nv,) is L⁻¹ times the unconstrained right side; ``target`` (P, 3) the part of the
-    points' acceleration (or velocity) that is not J x. Writes x (nv,) and force (P, 3); returns
-    False if the contact equations have no solution.
-    """
-    nv = free.size
+def _assemble(rows, free, target, closed, mu, owner, G, b):
+    """Write the contact equations G f = b of all closed points; return their number of rows."""
     size = 0
-    for i in range(mode.size):
-        size += 3 if mode[i] == STICK else (1 if mode[i] == SLIP else 0)
-    Y = np.empty((size, nv))
-    G = np.empty((size, size))
-    b = np.empty(size)
-    owner = np.empty((size, 2), np.int64)
-    k = 0
-    for i in range(mode.size):
-        if mode[i] == STICK:
-            for a in range(3):
-                owner[k, 0], owner[k, 1] = i, a
-                Y[k] = rows[i, a]
-                k += 1
-        elif mode[i] == SLIP:
-            owner[k, 0], owner[k, 1] = i, 2
-            for c in range(nv):
-                Y[k, c] = rows[i, 2, c] - mu[i] * (
-                    slide[i, 0] * rows[i, 0, c] + slide[i, 1] * rows[i, 1, c]
-                )
-            k += 1
+    for i in range(closed.size):
+        if closed[i]:
+            for a in range(0 if mu[i] > 0.0 else 2, 3):
+                owner[size, 0], owner[size, 1] = i, a
+                size += 1
     largest = 0.0
+    nv = free.size
     for r in range(size):
         i, a = owner[r]
         s = target[i, a]
         for c in range(nv):
             s += rows[i, a, c] * free[c]
         b[r] = -s
-        for k in range(size):
+        for k in range(r + 1):
             s = 0.0
+            j, d = owner[k]
             for c in range(nv):
-                s += rows[i, a, c] * Y[k, c]
+                s += rows[i, a, c] * rows[j, d, c]
             G[r, k] = s
+            G[k, r] = s
         largest = max(largest, G[r, r])
     for r in range(size):
         G[r, r] += _RIDGE * largest
-    if not _eliminate(G, b, size):
-        return False
+    return size
+
+
+@njit(cache=True)
+def _friction(G, b, owner, size, mu, yielding, f):
+    """Solve (G + diag(yielding)) f = b with yielding >= 0 such that every cone holds.
+
+    ``yielding`` (P,) is -w / f_t of a sliding point over T, 0 of a sticking one. Newton on
+    mu f_n / |f_t| = 1, which is nearly affine in it (as in trust regions).
+    """
+    H = np.empty((size, size))
+    L = np.zeros((size, size))
+    slope = np.empty(size)
+    for _ in range(_ITERATIONS):
+        for r in range(size):
+            for k in range(size):
+                H[r, k] = G[r, k]
+            if owner[r, 1] < 2:
+                H[r, r] += yielding[owner[r, 0]]
+            f[r] = b[r]
+        if not cholesky(H, L):
+            return False
+        _forward(L, f)
+        _backward(L, f)
+        settled = True
+        for r in range(2, size):
+            i = owner[r, 0]
+            if owner[r, 1] != 2 or mu[i] == 0.0 or mu[i] == np.inf:
+                continue
+            normal = f[r]
+            tangent = math.hypot(f[r - 2], f[r - 1])
+            if normal <= 0.0:
+                loose = 1e9 * G[r, r]
+                settled = settled and yielding[i] == loose
+                yielding[i] = loose
+                continue
+            excess = tangent - mu[i] * normal
+            if abs(excess) <= _CONE * mu[i] * normal or (excess < 0.0 and yielding[i] == 0.0):
+                continue
+            settled = False
+            slope[:] = 0.0
+            slope[r - 2], slope[r - 1] = -f[r - 2], -f[r - 1]
+            _forward(L, slope)
+            _backward(L, slope)
+            along = (f[r - 2] * slope[r - 2] + f[r - 1] * slope[r - 1]) / tangent
+            ratio = mu[i] * normal / tangent
+            rate = mu[i] * slope[r] / tangent - ratio * along / tangent
+            if rate > 0.0:
+                yielding[i] = max(0.0, yielding[i] + (1.0 - ratio) / rate)
+            else:
+                yielding[i] = 2.0 * yielding[i] + G[r, r]
+        if settled:
+            break
+    return True
+
+
+@njit(cache=True)
+def solve(L, rows, free, target, closed, mu, yielding, x, force):
+    """Meet the contact conditions of the closed points.
+
+    ``free`` (nv,) is L⁻¹ times the unconstrained right side, ``yielding`` (P,) a first guess that
+    is improved. Writes x (nv,) and force (P, 3); returns False if there is no solution.
+    """
+    count = 3 * closed.size
+    G = np.empty((count, count))
+    b = np.empty(count)
+    f = np.empty(count)
+    owner = np.empty((count, 2), np.int64)
+    size = _assemble(rows, free, target, closed, mu, owner, G, b)
     force[:] = 0.0
     x[:] = free
-    for r in range(size):
-        i, a = owner[r]
-        force[i, a] += b[r]
-        if mode[i] == SLIP:
-            force[i, 0] -= mu[i] * slide[i, 0] * b[r]
-            force[i, 1] -= mu[i] * slide[i, 1] * b[r]
-        for c in range(nv):
-            x[c] += Y[r, c] * b[r]
+    if size > 0:
+        if not _friction(G, b, owner, size, mu, yielding, f[:size]):
+            return False
+        for r in range(size):
+            i, a = owner[r]
+            force[i, a] = f[r]
+            for c in range(x.size):
+                x[c] += rows[i, a, c] * f[r]
     _backward(L, x)
     return True
 
 
 @njit(cache=True)
-def forward_dynamics(
-    M, right, J, C, target, velocity, mode, slide, mu, L, rows, acceleration, force
-):
-    """Acceleration (nv,) and contact forces (P, 3) under M v̇ = right + Jᵀf; False if singular."""
-    if not cholesky(M, L):
-        return False
-    project(L, J, C, rows)
-    _aim(C, velocity, mode, slide)
-    free = right.copy()
-    _forward(L, free)
-    return solve(L, rows, free, target, mode, slide, mu, acceleration, force)
+def settle(L, rows, free, target, touching, closed, mu, yielding, tolerance, x, force):
+    """Find which touching points are closed, so that none pulls and none sinks in.
 
-
-@njit(cache=True)
-def _aim(C, velocity, mode, slide):
-    """Turn the sliding direction of every slipping point along its velocity."""
-    for i in range(mode.size):
-        if mode[i] == SLIP:
-            a = C[i, 0, 0] * velocity[i, 0] + C[i, 0, 1] * velocity[i, 1]
-            a += C[i, 0, 2] * velocity[i, 2]
-            b = C[i, 1, 0] * velocity[i, 0] + C[i, 1, 1] * velocity[i, 1]
-            b += C[i, 1, 2] * velocity[i, 2]
-            speed = math.hypot(a, b)
-            if speed > _REST:
-                slide[i, 0], slide[i, 1] = a / speed, b / speed
-
-
-@njit(cache=True)
-def settle(L, rows, free, target, touching, rest, mode, slide, mu, tolerance, x, force):
-    """Find modes in which no contact pulls, none sinks in and every friction cone holds.
-
-    Works on accelerations and forces, or on velocities and impulses (plastic impact). ``rest`` is
-    the mode that a point takes when it closes. Starts from ``mode`` and changes the worst point
-    until nothing is violated. Returns 0 when settled, 1 if no consistent set was found, 2 if the
-    equations have no solution.
+    Works on accelerations and forces, or on velocities and impulses (plastic impact). Starts from
+    ``closed`` and changes the worst point until nothing is violated. Returns 0 when settled, 1 if
+    no consistent set was found, 2 if the equations have no solution.
     """
-    count = mode.size
+    count = closed.size
     for _ in range(8 * count + 8):
-        if not solve(L, rows, free, target, mode, slide, mu, x, force):
+        if not solve(L, rows, free, target, closed, mu, yielding, x, force):
             return 2
-        worst, which, change = tolerance, -1, OPEN
+        worst, which = tolerance, -1
         for i in range(count):
             if touching[i] == 0:
                 continue
-            if mode[i] == OPEN:
-                rate = target[i, 2]
-                sink = -rate - _along(L, rows, i, x)
-                if sink > worst:
-                    worst, which, change = sink, i, rest[i]
-            elif -force[i, 2] > worst:
-                worst, which, change = -force[i, 2], i, OPEN
-            elif mode[i] == STICK:
-                excess = math.hypot(force[i, 0], force[i, 1]) - mu[i] * force[i, 2]
-                if excess > worst:
-                    worst, which, change = excess, i, SLIP
+            bad = -force[i, 2] if closed[i] else -target[i, 2] - _along(L, rows, i, x)
+            if bad > worst:
+                worst, which = bad, i
         if which < 0:
             return 0
-        if change == SLIP and mode[which] == STICK:
-            pull = math.hypot(force[which, 0], force[which, 1])
-            slide[which, 0] = -force[which, 0] / pull
-            slide[which, 1] = -force[which, 1] / pull
-        mode[which] = change
+        closed[which] = 1 - closed[which]
+        yielding[which] = 0.0
     return 1
 
 
@@ -230,107 +244,42 @@ def _along(L, rows, i, x):
 
 
 @njit(cache=True)
-def margins(C, velocity, force, gap, mode, slide, mu, weight, out):
-    """Write for every point how far each of its two ending conditions is from happening (P, 2).
+def margins(C, velocity, force, gap, closed, weight, out):
+    """Write for every point how far its ending condition is from happening (P,).
 
-    OPEN: the gap (m), inf if it widens. STICK: the normal force and the friction cone's margin
-    (body weights). SLIP: the normal force and the speed (m/s) along the sliding direction at the
-    beginning of the step.
+    Open: the gap (m), inf if it widens. Closed: the normal force in body weights.
     """
-    for i in range(mode.size):
-        out[i, 1] = np.inf
-        if mode[i] == OPEN:
-            rate = 0.0
-            for b in range(3):
-                rate += C[i, 2, b] * velocity[i, b]
-            out[i, 0] = gap[i] if rate < 0.0 else np.inf
+    for i in range(closed.size):
+        if closed[i]:
+            out[i] = force[i, 2] / weight
             continue
-        out[i, 0] = force[i, 2] / weight
-        if mode[i] == STICK:
-            if mu[i] != np.inf:
-                grip = mu[i] * force[i, 2] - math.hypot(force[i, 0], force[i, 1])
-                out[i, 1] = grip / weight
-        else:
-            s = 0.0
-            for b in range(3):
-                s += (slide[i, 0] * C[i, 0, b] + slide[i, 1] * C[i, 1, b]) * velocity[i, b]
-            out[i, 1] = s
+        rate = 0.0
+        for b in range(3):
+            rate += C[i, 2, b] * velocity[i, b]
+        out[i] = gap[i] if rate < 0.0 else np.inf
 
 
 @njit(cache=True)
-def contact_power(C, velocity, force, mode, out):
-    """Write the power of sticking (out[0]) and sliding (out[1]) contact forces."""
+def _contact_power(C, velocity, force, closed, out):
+    """Write the power of normal (out[0]) and tangential (out[1]) contact forces."""
     out[0] = 0.0
     out[1] = 0.0
-    for i in range(mode.size):
-        if mode[i] == OPEN:
-            continue
-        tangent = 0.0
-        normal = 0.0
-        for b in range(3):
-            tangent += (force[i, 0] * C[i, 0, b] + force[i, 1] * C[i, 1, b]) * velocity[i, b]
-            normal += force[i, 2] * C[i, 2, b] * velocity[i, b]
-        if mode[i] == SLIP:
-            out[0] += normal
-            out[1] += tangent
-        else:
-            out[0] += normal + tangent
+    for i in range(closed.size):
+        if closed[i]:
+            for b in range(3):
+                out[0] += force[i, 2] * C[i, 2, b] * velocity[i, b]
+                tangent = force[i, 0] * C[i, 0, b] + force[i, 1] * C[i, 1, b]
+                out[1] += tangent * velocity[i, b]
 
 
 @njit(cache=True)
-def evaluate(
-    M, nle, frames, v, joint, motor, spring, shape, ground, gain, state, load, torsion, instant
-):
-    """Spring torque, applied forces, contact forces and acceleration at one instant.
-
-    Groups of arrays, all preallocated: ``frames`` (J, R, p, drift) of the feet and loaded frames,
-    ``joint`` link positions (n,), ``motor`` (n, 2) angle and speed, ``spring`` (K, D_s),
-    ``shape`` (frame_of, offset, count of contact points), ``ground`` (C, anchor, mu), ``state``
-    (mode, slide), ``load`` (forces (L, 3) on the points after the contact points), ``torsion``
-    (F, 2) coefficient and limit. Writes ``instant`` (tau, acceleration, force, position, velocity,
-    target, right, L, rows, power, J, drift); power: holding, sliding, torsional, load, kinetic energy.
-    """
-    J_frame, R, p, drift_frame = frames
-    frame_of, offset = shape
-    C, anchor, mu = ground
-    mode, slide = state
-    tau, acceleration, force, position, velocity, target, right, L, rows, power, J, drift = instant
-    points(J_frame, R, p, drift_frame, v, frame_of, offset, J, position, velocity, drift)
-    nv, n, count = v.size, joint.size, mode.size
-    for i in range(nv):
-        right[i] = -nle[i]
-    for i in range(n):
-        tau[i] = spring[0][i] * (motor[i, 0] - joint[i])
-        tau[i] += spring[1][i] * (motor[i, 1] - v[nv - n + i])
-        right[nv - n + i] += tau[i]
-    power[2] = _torsion(J_frame, v, torsion, C, mode, frame_of, right)
-    power[3] = 0.0
-    for k in range(load.shape[0]):
-        for a in range(3):
-            if load[k, a] != 0.0:
-                power[3] += load[k, a] * velocity[count + k, a]
-                for c in range(nv):
-                    right[c] += J[count + k, a, c] * load[k, a]
-    demand(C, position, anchor, velocity, drift, gain, target)
-    solved = forward_dynamics(
-        M, right, J, C, target, velocity, mode, slide, mu, L, rows, acceleration, force
-    )
-    contact_power(C, velocity, force, mode, power)
-    power[4] = 0.0
-    for i in range(nv):
-        for j in range(nv):
-            power[4] += 0.5 * v[i] * M[i, j] * v[j]
-    return solved
-
-
-@njit(cache=True)
-def _torsion(J_frame, v, torsion, C, mode, frame_of, right):
+def _torsion(J_frame, v, torsion, C, closed, frame_of, right):
     """Add the patch friction torque about the normal of every loaded foot; return its power."""
     total = 0.0
     done = -1
-    for i in range(mode.size):
+    for i in range(closed.size):
         f = frame_of[i]
-        if mode[i] == OPEN or f == done or torsion[f, 0] == 0.0:
+        if closed[i] == 0 or f == done or torsion[f, 0] == 0.0:
             continue
         done = f
         spin = 0.0
@@ -343,3 +292,53 @@ def _torsion(J_frame, v, torsion, C, mode, frame_of, right):
             for c in range(v.size):
                 right[c] += C[i, 2, a] * J_frame[f, 3 + a, c] * torque
     return total
+
+
+@njit(cache=True)
+def evaluate(
+    M, nle, frames, v, joint, motor, spring, shape, ground, rates, state, load, torsion, instant
+):
+    """Spring torque, applied forces, contact forces and acceleration at one instant.
+
+    Groups of arrays, all preallocated: ``frames`` (J, R, p, drift) of the feet and loaded frames,
+    ``joint`` link positions (n,), ``motor`` (n, 2) angle and speed, ``spring`` (K, D_s),
+    ``shape`` (frame_of, offset), ``ground`` (C, anchor, mu), ``rates`` (stabilisation gain, stop
+    time), ``state`` (closed, yielding), ``load`` forces (L, 3) on the points after the contact
+    points, ``torsion`` (F, 2) coefficient and limit. Writes ``instant``: tau, acceleration, force,
+    position, velocity, target, right, L, rows, power, J, drift; power: normal, tangential,
+    torsional, load, and kinetic energy. Returns False if the equations have no solution.
+    """
+    J_frame, R, p, drift_frame = frames
+    frame_of, offset = shape
+    C, anchor, mu = ground
+    closed, yielding = state
+    tau, acceleration, force, position, velocity, target, right, L, rows, power, J, drift = instant
+    points(J_frame, R, p, drift_frame, v, frame_of, offset, J, position, velocity, drift)
+    nv, n, count = v.size, joint.size, closed.size
+    for i in range(nv):
+        right[i] = -nle[i]
+    for i in range(n):
+        tau[i] = spring[0][i] * (motor[i, 0] - joint[i])
+        tau[i] += spring[1][i] * (motor[i, 1] - v[nv - n + i])
+        right[nv - n + i] += tau[i]
+    power[2] = _torsion(J_frame, v, torsion, C, closed, frame_of, right)
+    power[3] = 0.0
+    for k in range(load.shape[0]):
+        for a in range(3):
+            if load[k, a] != 0.0:
+                power[3] += load[k, a] * velocity[count + k, a]
+                for c in range(nv):
+                    right[c] += J[count + k, a, c] * load[k, a]
+    demand(C, position, anchor, velocity, drift, rates[0], rates[1], target)
+    power[4] = 0.0
+    for i in range(nv):
+        for j in range(nv):
+            power[4] += 0.5 * v[i] * M[i, j] * v[j]
+    if not cholesky(M, L):
+        return False
+    project(L, J, C, rows)
+    free = right.copy()
+    _forward(L, free)
+    solved = solve(L, rows, free, target, closed, mu, yielding, acceleration, force)
+    _contact_power(C, velocity, force, closed, power)
+    return solved

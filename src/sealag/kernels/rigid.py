@@ -10,9 +10,6 @@ import math
 import numpy as np
 from numba import njit
 
-OPEN, STICK, SLIP = 0, 1, 2
-_REST = 1e-9  # m/s below which a sliding direction is taken from memory
-
 
 @njit(cache=True)
 def _cross(a, b, out):
@@ -143,31 +140,3 @@ def _backward(L, x):
         for k in range(i + 1, x.size):
             s -= L[k, i] * x[k]
         x[i] = s / L[i, i]
-
-
-@njit(cache=True)
-def _eliminate(G, b, k):
-    """Solve G[:k, :k] x = b[:k] in place by elimination with partial pivoting."""
-    for j in range(k):
-        p = j
-        for i in range(j + 1, k):
-            if abs(G[i, j]) > abs(G[p, j]):
-                p = i
-        if G[p, j] == 0.0:
-            return False
-        if p != j:
-            for c in range(j, k):
-                G[j, c], G[p, c] = G[p, c], G[j, c]
-            b[j], b[p] = b[p], b[j]
-        for i in range(j + 1, k):
-            f = G[i, j] / G[j, j]
-            if f != 0.0:
-                for c in range(j, k):
-                    G[i, c] -= f * G[j, c]
-                b[i] -= f * b[j]
-    for i in range(k - 1, -1, -1):
-        s = b[i]
-        for c in range(i + 1, k):
-            s -= G[i, c] * b[c]
-        b[i] = s / G[i, i]
-    return True

@@ -1,4 +1,4 @@
-"""Which contact points hold, slide or are open, and how far each is from changing."""
+"""Which contact points are closed, and how far each is from changing."""
 
 from collections.abc import Sequence
 
@@ -12,21 +12,21 @@ from sealag.simulation._instant import Instant
 from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.typing import Array, IntArray
 
-OPEN, STICK, SLIP = 0, 1, 2
-MARGIN = 1e-9  # in body weights, m and m/s: a condition this close to ending is at its end
-_NEAR = 1e-7  # m, m/s: closed points' partners in the same event
+MARGIN = 1e-9  # m and body weights: a contact this close to changing is at its change
+_NEAR = 1e-7  # m, m/s: points this near take part in the same change
 _BURIED = 1e-4  # m: how deep a foot may begin inside the ground
 
 
 class Contacts:
-    """The contact points of all feet: their frames of reference, modes and margins.
+    """The contact points of all feet: their frames of reference, states and margins.
 
     Args:
         robot: The robot.
         feet: What may touch the ground.
         ground: Where the ground is.
         loaded_frames: Frames on which disturbing forces act; their points follow the feet's.
-        stabilisation: Rate at which contacts return to where they closed, 1/s.
+        stabilisation: Rate at which contacts return to the height where they closed, 1/s.
+        stop_time: Time within which friction may stop a point for it to stick, s.
     """
 
     def __init__(
@@ -37,11 +37,12 @@ class Contacts:
         loaded_frames: Sequence[str],
         *,
         stabilisation: float,
+        stop_time: float,
     ) -> None:
         from sealag.kernels import contact
 
         self._kernel = contact
-        self.feet, self.ground, self.stabilisation = tuple(feet), ground, stabilisation
+        self.feet, self.ground, self.rates = tuple(feet), ground, (stabilisation, stop_time)
         frames = [foot.contact.frame for foot in feet]
         self.body = Body(robot, [*frames, *loaded_frames])
         offsets = [foot.offsets() for foot in feet]
@@ -58,30 +59,25 @@ class Contacts:
         self.anchor = np.zeros((self.count, 3))
         self.mu = np.ascontiguousarray(mu, dtype=float)
         self.ground_arrays = (self.C, self.anchor, self.mu)
-        self.mode = np.zeros(self.count, np.int64)
-        self.slide = np.zeros((self.count, 2))
-        self.state = (self.mode, self.slide)
+        self.closed = np.zeros(self.count, np.int64)
+        self.yielding = np.zeros(self.count)
+        self.state = (self.closed, self.yielding)
         self.torsion = np.zeros((len(frames) + len(loaded_frames), 2))
         for f, foot in enumerate(feet):
             self.torsion[f] = foot.torsional_damping, foot.torsional_limit
         self._weight = robot.mass * 9.81
         self._radius = np.array([feet[f].radius for f in self.foot_of])
-        self._rest = np.zeros(self.count, np.int64)
-        self._slide_before = np.zeros((self.count, 2))
-        self._margins = np.zeros((self.count, 2))
+        self._margins = np.zeros(self.count)
 
     def open_all(self) -> None:
         """Open every contact."""
-        self.mode[:] = OPEN
-        self.slide[:] = 0.0
+        self.closed[:] = 0
+        self.yielding[:] = 0.0
 
-    def remember(self) -> None:
-        """Keep the sliding directions of the step's beginning."""
-        self._slide_before[:] = self.slide
-
-    def recall(self) -> None:
-        """Return to the sliding directions of the step's beginning."""
-        self.slide[:] = self._slide_before
+    @property
+    def mode(self) -> IntArray:
+        """0 where open, 1 where sticking, 2 where sliding (P,)."""
+        return self.closed * (1 + (self.yielding > 0.0))
 
     def height(self, at: Instant, point: int) -> float:
         """Return the height (m) of a point's sole above the ground below it."""
@@ -89,10 +85,9 @@ class Contacts:
         return z - float(self._radius[point]) - self.ground.height(x, y)
 
     def measure_gaps(self, at: Instant) -> None:
-        """Measure the gaps of all open points that are not moving away."""
+        """Measure the gaps of all open points."""
         for point in range(self.count):
-            closed = self.mode[point] != OPEN
-            at.gap[point] = np.inf if closed else self.height(at, point)
+            at.gap[point] = np.inf if self.closed[point] else self.height(at, point)
 
     def refuse_buried(self, at: Instant) -> None:
         """Raise InputError if a foot begins inside the ground."""
@@ -105,23 +100,19 @@ class Contacts:
                 )
 
     def margin(self, at: Instant) -> tuple[float, int]:
-        """Return the smallest margin and its point; negative means that a contact must change.
-
-        In body weights (forces), m (gaps) and m/s (sliding speeds).
-        """
+        """Return the smallest margin (m, body weights) and its point; below 0 it must change."""
         if self.count == 0:
             return np.inf, -1
         self._kernel.margins(
-            self.C, at.velocity, at.force, at.gap, self.mode, self._slide_before, self.mu,
-            self._weight, self._margins,
-        )  # fmt: skip
+            self.C, at.velocity, at.force, at.gap, self.closed, self._weight, self._margins
+        )
         worst = int(self._margins.argmin())
-        return float(self._margins.flat[worst]), worst // 2
+        return float(self._margins[worst]), worst
 
     def touching(self, at: Instant, *, tolerance: float = _NEAR) -> IntArray:
         """Return 1 for every point that is closed or could close now (P,)."""
-        mask = (self.mode != OPEN).astype(np.int64)
-        for point in np.flatnonzero(self.mode == OPEN):
+        mask = self.closed.copy()
+        for point in np.flatnonzero(mask == 0):
             near = self.height(at, int(point)) <= tolerance
             if near and self._approach(at, int(point)) <= _NEAR:
                 mask[point] = 1
@@ -132,61 +123,54 @@ class Contacts:
         return float(contact_frame(self.ground, x, y)[2] @ at.velocity[point])
 
     def close(self, at: Instant, point: int) -> None:
-        """Let a point stick where it is."""
+        """Let a point touch the ground where it is."""
         x, y, _ = at.position[point].tolist()
         self.C[point] = contact_frame(self.ground, x, y)
         self.anchor[point] = at.position[point]
-        self.mode[point] = STICK
+        self.closed[point] = 1
+        self.yielding[point] = 0.0
 
     def loaded(self) -> Array:
         """Return 1.0 for every foot that has a closed point (F,)."""
         flags = np.zeros(len(self.feet))
-        flags[self.foot_of[self.mode != OPEN]] = 1.0
+        flags[self.foot_of[self.closed == 1]] = 1.0
         return flags
-
-    def halted(self, at: Instant, point: int) -> bool:
-        """Tell whether a sliding point has come to rest, not only turned."""
-        tangent = self.C[point, :2] @ at.velocity[point]
-        return float(np.abs(tangent).max()) < 1e-5
 
     def strike(self, at: Instant, mask: IntArray) -> tuple[Array, Array]:
         """Solve the plastic impact of the touching points; return velocity and impulses.
 
-        The modes become those that hold during the impact: points that rebound are open, points
-        whose impulse leaves the friction cone slip.
+        Points that rebound are open afterwards; tangential impulses obey the friction cone.
         """
         speed, impulse = np.zeros_like(at.v), np.zeros((self.count, 3))
-        free = at.L.T @ at.v
         self._kernel.project(at.L, at.J, self.C, at.rows)
-        self._rest[:] = STICK
-        self._settle(at, free, np.zeros((self.count, 3)), mask, speed, impulse)
+        yielding = np.zeros(self.count)
+        none = np.zeros((self.count, 3))
+        self._settle(at, at.L.T @ at.v, none, mask, yielding, speed, impulse)
         return speed, impulse
 
     def settle(self, at: Instant, mask: IntArray) -> None:
-        """Find the modes in which contact forces and accelerations of touching points agree."""
-        tangent = np.einsum("pab,pb->pa", self.C[:, :2], at.velocity[: self.count])
-        speed = np.linalg.norm(tangent, axis=1)
-        moving = speed > _NEAR
-        self._rest[:] = np.where(moving, SLIP, STICK)
-        self.mode[(self.mode == STICK) & moving & (mask == 1)] = SLIP
-        self.mode[(self.mode == SLIP) & ~moving] = STICK
-        self.slide[moving] = tangent[moving] / speed[moving, None]
-        free = np.linalg.solve(at.L, at.right)
+        """Find which touching points stay closed under the forces of this instant."""
         self._kernel.demand(
-            self.C, at.position, self.anchor, at.velocity, at.solved[-1], self.stabilisation,
-            at.target,
-        )  # fmt: skip
+            self.C, at.position, self.anchor, at.velocity, at.solved[-1], *self.rates, at.target
+        )
         self._kernel.project(at.L, at.J, self.C, at.rows)
-        self._settle(at, free, at.target, mask, np.zeros_like(at.v), np.zeros((self.count, 3)))
+        free, x = np.linalg.solve(at.L, at.right), np.zeros_like(at.v)
+        self._settle(at, free, at.target, mask, self.yielding, x, np.zeros((self.count, 3)))
 
     def _settle(
-        self, at: Instant, free: Array, target: Array, mask: IntArray, x: Array, force: Array
+        self,
+        at: Instant,
+        free: Array,
+        target: Array,
+        mask: IntArray,
+        yielding: Array,
+        x: Array,
+        force: Array,
     ) -> None:
         tolerance = 1e-9 * self._weight
         status = self._kernel.settle(
-            at.L, at.rows, free, target, mask, self._rest, self.mode, self.slide, self.mu,
-            tolerance, x, force,
-        )  # fmt: skip
+            at.L, at.rows, free, target, mask, self.closed, self.mu, yielding, tolerance, x, force
+        )
         if status:
             touching = sorted({self.feet[self.foot_of[p]].contact.frame for p in mask.nonzero()[0]})
             raise PlantStop(

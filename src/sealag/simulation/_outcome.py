@@ -27,8 +27,6 @@ class EventKind(StrEnum):
 
     TOUCHDOWN = "touchdown"
     LIFT_OFF = "lift_off"
-    SLIP = "slip"
-    STICK = "stick"
 
 
 class PlantStop(Exception):  # noqa: N818 - not an error: the plant's way out of a step

@@ -1,9 +1,9 @@
 """The robot with springs on its ground, moved by one step of exactly known error.
 
 Link side: classical fourth-order Runge-Kutta in exponential coordinates about the step's start.
-Motor side: exact along the link's cubic motion. Changes of contact are located inside the step to
-rounding and end it there, so that the order survives them; torque and velocity limits, Coulomb
-stick and changes of applied forces act from the beginning of a step.
+Motor side: exact along the link's cubic motion. Touchdown and lift-off are located inside the step
+and end it there, so that the order survives them. First order: sliding friction's direction (see
+kernels.contact), torque and velocity limits and Coulomb stick, which act from a step's beginning.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ import numpy as np
 from sealag.actuation import Actuators
 from sealag.errors import InputError
 from sealag.robot import Robot
-from sealag.simulation._contacts import MARGIN, OPEN, SLIP, STICK, Contacts
+from sealag.simulation._contacts import MARGIN, Contacts
 from sealag.simulation._ground import FlatGround, Foot, Ground
 from sealag.simulation._instant import Instant
 from sealag.simulation._ledger import Ledger
@@ -86,8 +86,9 @@ class Plant:
         self._rigid, self._motor, self._contact_kernel = rigid, motor, contact
         self.robot, self.actuators, self.step_length = robot, actuators, step
         self.contacts = Contacts(
-            robot, feet, ground or FlatGround(), loaded_frames, stabilisation=stabilisation
-        )
+            robot, feet, ground or FlatGround(), loaded_frames, stabilisation=stabilisation,
+            stop_time=step,
+        )  # fmt: skip
         n, nv, count = robot.n, robot.nv, self.contacts.count
         self.time = 0.0
         self._base = robot.nv_base
@@ -203,7 +204,6 @@ class Plant:
         measured = self._now.tau if tau_measured is None else tau_measured
         left, regular = self.step_length, True
         for _ in range(_EVENTS_PER_STEP):
-            self.contacts.remember()
             self._try(left, regular, tau_osc, measured)
             margin, point = self.contacts.margin(self._next)
             if margin >= -MARGIN:
@@ -261,7 +261,7 @@ class Plant:
         solved = self._contact_kernel.evaluate(
             at.M, at.nle, contacts.body.frames, at.v, at.q[-self.robot.n :],
             at.z[:, :2] if motor is None else motor, self._spring, contacts.shape,
-            contacts.ground_arrays, contacts.stabilisation, contacts.state, self.load,
+            contacts.ground_arrays, contacts.rates, contacts.state, self.load,
             contacts.torsion, at.solved,
         )  # fmt: skip
         if not solved:
@@ -285,7 +285,6 @@ class Plant:
         side = 0
         for _ in range(_LOCATE):
             middle = (low * f_high - high * f_low) / (f_high - f_low)
-            self.contacts.recall()
             self._try(middle, False, tau_osc, measured)
             value, at = self.contacts.margin(self._next)
             point = at if value < MARGIN else point
@@ -304,21 +303,18 @@ class Plant:
     def _change(self, point: int) -> None:
         """Let a contact point change at the present instant, where its margin has vanished."""
         now, contacts = self._now, self.contacts
-        before = contacts.mode.copy()
-        if before[point] == OPEN:
-            self._touch(now, contacts.touching(now))
-        else:
-            if before[point] == SLIP and contacts.halted(now, point):
-                contacts.close(now, point)
-                self._strike(now, (contacts.mode != OPEN).astype(np.int64))
+        before = contacts.closed.copy()
+        if before[point]:
             contacts.settle(now, contacts.touching(now))
             self._evaluate(now)
             contacts.measure_gaps(now)
+        else:
+            self._touch(now, contacts.touching(now))
         self._report(before)
 
     def _touch(self, now: Instant, mask: IntArray) -> None:
         """Close every masked point by a plastic impact, then find which contacts hold."""
-        for point in np.flatnonzero((mask == 1) & (self.contacts.mode == OPEN)):
+        for point in np.flatnonzero(mask > self.contacts.closed):
             self.contacts.close(now, int(point))
         if mask.any():
             self._strike(now, mask)
@@ -336,16 +332,14 @@ class Plant:
         self.ledger.strike(-float((mean * impulse).sum()), now)
 
     def _report(self, before: Array) -> None:
-        kinds = {OPEN: EventKind.LIFT_OFF, STICK: EventKind.STICK, SLIP: EventKind.SLIP}
-        after = self.contacts.mode
+        after = self.contacts.closed
         for point in np.flatnonzero(before != after):
-            kind = EventKind.TOUCHDOWN if before[point] == OPEN else kinds[int(after[point])]
-            hit = kind == EventKind.TOUCHDOWN
+            hit = bool(after[point])
             x, y, z = self.impulse[point].tolist() if hit else (0.0, 0.0, 0.0)
             self.events.append(
                 ContactEvent(
                     time=self.time,
-                    kind=kind,
+                    kind=EventKind.TOUCHDOWN if hit else EventKind.LIFT_OFF,
                     foot=self.contacts.feet[self.contacts.foot_of[point]].contact.frame,
                     point=int(point),
                     impulse=(x, y, z),

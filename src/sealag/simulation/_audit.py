@@ -1,0 +1,141 @@
+"""Energy audit: the first law at every logged instant, and who has been passive so far.
+
+Physical books: E = kinetic + gravity + spring + motor (½ θ̇ᵀB θ̇). Works come from exact integrals
+of the motor motion (motors, springs) and Runge-Kutta integrals of powers (contacts, pushes); none
+is a remainder, so that the residual measures the integrator and the books.
+
+Passivity at the port between embedded and central side, (tau_osc - D_theta θ̇, θ̇), with the shaped
+rotor inertia B_s as in the storage function S_j = V_1:
+
+- joint side:      ∫(τ_osc - D_θ θ̇)ᵀθ̇ dt + disturbances - (S_j - S_j(0)) >= 0,
+- controller side: -∫(τ_osc - D_θ θ̇)ᵀθ̇ dt - (V_3 - V_3(0)) >= 0, the slack being V_4 (what the
+  delay line stores) and what was dissipated.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.simulation._ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
+from sealag.typing import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Passivity:
+    """Running statement of the passivity observer about one side.
+
+    Attributes:
+        slack: Energy still allowed at each logged instant (N,), J; negative is not passive.
+        passive: True if the slack never fell below ``-tolerance``.
+        first_violation: First logged instant at which it did, s; None if never.
+        joint: Joint that had delivered most energy at that instant; None if never.
+        tolerance: What rounding and integration may spend, J.
+    """
+
+    slack: Array
+    passive: bool
+    first_violation: float | None
+    joint: str | None
+    tolerance: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Audit:
+    """Energies and works of a run at its logged instants, cumulative since the start, J.
+
+    Attributes:
+        time: Logged instants (N,), s.
+        stores: Kinetic, gravity, spring and motor energy by name, each (N,).
+        joint_flows: Works per joint by name, each (N, n): port ∫τ_sea q̇, shaft ∫τ_sea θ̇,
+            motor_work ∫τ_m θ̇, command ∫τ_osc θ̇, damping ∫D_θ θ̇², viscous and coulomb friction,
+            spring_damping.
+        scalar_flows: Works done on the robot by name, each (N,): holding (contact
+            stabilisation), sliding, torsion, disturbance; and impact, which is lost.
+        inertia_shaping: Work of the embedded torque feedback, limits and bandwidth (N,):
+            motor_work less what tau_osc and the damping account for through B / B_s.
+        residual: Energy present less energy expected (N,): the first law's error.
+        throughput: Sum of the absolute changes of the stores (N,).
+        joint_side: Passivity of springs, motors, links and contacts (S_j).
+        controller_side: Passivity of controller and delay (S_c); None if the controller states
+            no storage function.
+    """
+
+    time: Array
+    stores: dict[str, Array]
+    joint_flows: dict[str, Array]
+    scalar_flows: dict[str, Array]
+    inertia_shaping: Array
+    residual: Array
+    throughput: Array
+    joint_side: Passivity
+    controller_side: Passivity | None
+
+    @property
+    def closure(self) -> float:
+        """Largest residual over the run as a fraction of the final throughput."""
+        largest = float(np.abs(self.residual).max(initial=0.0))
+        moved = float(self.throughput[-1]) if self.throughput.size else 0.0
+        return largest / moved if moved > 0 else largest
+
+
+def audit(
+    *,
+    time: Array,
+    joints: tuple[str, ...],
+    stores: Array,
+    joint: Array,
+    scalar: Array,
+    residual: Array,
+    throughput: Array,
+    storage: Array | None,
+    shaped: Array,
+    ratio: Array,
+) -> Audit:
+    """Assemble the audit of a run from its logged books.
+
+    Args:
+        time: Instants (N,), s.
+        joints: Joint names.
+        stores: Energies (N, 4), J.
+        joint: Works per joint (N, 8, n), J.
+        scalar: Other works (N, 5), J.
+        residual: First-law residual (N,), J.
+        throughput: Energy moved (N,), J.
+        storage: Controller's V_3 (N,), J; None if it states none.
+        shaped: Energy of the shaped rotors ½ θ̇ᵀB_s θ̇ (N,), J.
+        ratio: B / B_s (n,).
+    """
+    flows = {name: joint[:, k] for k, name in enumerate(JOINT_FLOWS)}
+    drive = flows["command"] - flows["damping"]
+    tolerance = 1e-6 * float(throughput[-1]) + 1e-9 if time.size else 0.0
+    s_j = stores[:, :3].sum(axis=1) + shaped
+    joint_slack = drive.sum(axis=1) + scalar[:, 3] - (s_j - s_j[:1])
+    control = None
+    if storage is not None:
+        slack = -drive.sum(axis=1) - (storage - storage[:1])
+        control = _observe(time, slack, drive, joints, tolerance)
+    return Audit(
+        time=time,
+        stores={name: stores[:, k] for k, name in enumerate(STORES)},
+        joint_flows=flows,
+        scalar_flows={name: scalar[:, k] for k, name in enumerate(SCALAR_FLOWS)},
+        inertia_shaping=(flows["motor_work"] - ratio * drive).sum(axis=1),
+        residual=residual,
+        throughput=throughput,
+        joint_side=_observe(time, joint_slack, -drive, joints, tolerance),
+        controller_side=control,
+    )
+
+
+def _observe(
+    time: Array, slack: Array, delivered: Array, joints: tuple[str, ...], tolerance: float
+) -> Passivity:
+    broken = np.flatnonzero(slack < -tolerance)
+    first = int(broken[0]) if broken.size else None
+    return Passivity(
+        slack=slack,
+        passive=first is None,
+        first_violation=None if first is None else float(time[first]),
+        joint=None if first is None else joints[int(delivered[first].argmax())],
+        tolerance=tolerance,
+    )

@@ -1,0 +1,419 @@
+"""The closed loop: plant, links and controller, each at its own rate."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sealag.actuation import Actuators
+from sealag.delay import DelayLine
+from sealag.errors import InputError, SealagError
+from sealag.robot import Robot
+from sealag.simulation._audit import audit
+from sealag.simulation._ground import FlatGround, Foot, Ground
+from sealag.simulation._ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
+from sealag.simulation._network import Clock, Network
+from sealag.simulation._outcome import Outcome, PlantStop
+from sealag.simulation._plant import Plant
+from sealag.simulation._run import Log, Run
+from sealag.typing import Array
+from sealag.whole_body import Measurement, StoringController, TickController
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Push:
+    """A constant force on the origin of a frame for some time.
+
+    Attributes:
+        frame: Where it acts.
+        force: Force in the world frame (3,), N.
+        start: When it begins, s; it begins and ends at the nearest physics steps.
+        duration: How long it lasts, s.
+
+    Raises:
+        InputError: The force is not three finite numbers, or the times are negative.
+    """
+
+    frame: str
+    force: tuple[float, float, float]
+    start: float
+    duration: float
+
+    def __post_init__(self) -> None:
+        if len(self.force) != 3 or not all(map(math.isfinite, self.force)):
+            raise InputError(f"push on {self.frame}: force must be 3 finite numbers (N)")
+        if not (self.start >= 0 and self.duration > 0 and math.isfinite(self.start)):
+            raise InputError(
+                f"push on {self.frame}: start must be >= 0 s and duration > 0 s, "
+                f"got {self.start} and {self.duration}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FallLimits:
+    """When a floating-base robot counts as fallen.
+
+    Attributes:
+        height_fraction: Base height above the ground, as a fraction of its height at the start.
+        tilt: Angle between the base's z axis and its direction at the start, rad.
+    """
+
+    height_fraction: float = 0.5
+    tilt: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """What surrounds the robot.
+
+    Attributes:
+        feet: What may touch the ground.
+        ground: Where the ground is.
+        pushes: Disturbing forces.
+        fall: When the robot counts as fallen; None never.
+        stabilisation: Rate at which contacts return to where they closed, 1/s.
+    """
+
+    feet: Sequence[Foot] = ()
+    ground: Ground = field(default_factory=FlatGround)
+    pushes: Sequence[Push] = ()
+    fall: FallLimits | None = field(default_factory=FallLimits)
+    stabilisation: float = 50.0
+
+
+def closed_loop(
+    robot: Robot,
+    actuators: Actuators,
+    controller: TickController,
+    *,
+    q: Array,
+    duration: float,
+    v: Array | None = None,
+    theta: Array | None = None,
+    theta_dot: Array | None = None,
+    network: Network | None = None,
+    clock: Clock | None = None,
+    scene: Scene | None = None,
+    seed: int = 0,
+    log_period: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Simulate robot, springs, contacts, links and controller together.
+
+    Args:
+        robot: The robot.
+        actuators: Its springs and motors.
+        controller: Any TickController.
+        q: Configuration at the start (nq,).
+        duration: How long to simulate, s.
+        v: Velocity at the start (nv,); default at rest.
+        theta: Motor angles at the start (n,), rad; default such that the springs carry the
+            controller's first command.
+        theta_dot: Motor speeds at the start (n,), rad/s; default the joint rates.
+        network: Delays, jitter and losses; default none.
+        clock: Periods of physics and controllers.
+        scene: Feet, ground, pushes and fall limits.
+        seed: Seed of jitter and losses; the same seed gives the same run.
+        log_period: Time between logged instants, s; default the central period.
+        progress: Called with the simulated time every 0.1 s.
+
+    Returns:
+        The run. A fall, divergence, failing controller or Ctrl-C ends it early with a named
+        outcome; everything logged until then is in it.
+
+    Raises:
+        InputError: An input cannot be simulated: shapes, no duration, a foot inside the ground,
+            no contact forces that can hold the first state.
+    """
+    loop = _Loop(
+        robot, actuators, controller, network or Network.ideal(), clock or Clock(),
+        scene or Scene(), seed,
+    )  # fmt: skip
+    loop.prepare(_state("q", q, robot.nq), _state("v", v, robot.nv), theta, theta_dot)
+    period = loop.clock.central if log_period is None else log_period
+    return loop.run(duration, period, progress)
+
+
+def _state(name: str, value: Array | None, size: int) -> Array:
+    if value is None:
+        return np.zeros(size)
+    array = np.asarray(value, dtype=float)
+    if array.shape != (size,) or not np.isfinite(array).all():
+        raise InputError(f"{name} must be {size} finite numbers, got shape {array.shape}")
+    return array
+
+
+class _Loop:
+    """One run's plant, links, controller and storage."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        actuators: Actuators,
+        controller: TickController,
+        network: Network,
+        clock: Clock,
+        scene: Scene,
+        seed: int,
+    ) -> None:
+        frames = list(dict.fromkeys(push.frame for push in scene.pushes))
+        self.robot, self.controller, self.clock, self.scene = robot, controller, clock, scene
+        self.seed, self._network = seed, network
+        self.plant = Plant(
+            robot,
+            actuators,
+            step=clock.physics,
+            feet=scene.feet,
+            ground=scene.ground,
+            loaded_frames=frames,
+            delayed_torque_feedback=network.embedded_up is not None,
+            stabilisation=scene.stabilisation,
+        )
+        n, feet = robot.n, len(scene.feet)
+        self._central_steps = clock.steps_of("central", clock.central)
+        self._embedded_steps = clock.steps_of("embedded", clock.embedded)
+        allocate = dict(nq=robot.nq, nv=robot.nv, n=n, contacts=feet)
+        self.truth = Measurement.allocate(**allocate)
+        self.received = Measurement.allocate(**allocate)
+        self.command, self._passing, self.acting = (np.zeros(n + 1) for _ in range(3))
+        self._torque_held = np.zeros(n)
+        self._open_lines(network, n)
+        self._storing = controller if isinstance(controller, StoringController) else None
+        self._pushes = [(frames.index(push.frame), push) for push in scene.pushes]
+        self._fall_height, self._upright = -np.inf, np.zeros(3)
+
+    def _open_lines(self, network: Network, n: int) -> None:
+        clock = self.clock
+        streams = [np.random.default_rng(s) for s in np.random.SeedSequence(self.seed).spawn(4)]
+
+        def line(link, width, period, receive_period, rng):
+            return DelayLine(
+                link, width=width, period=period, receive_period=receive_period, rng=rng
+            )
+
+        central, embedded = clock.central, clock.embedded
+        self._up = line(
+            network.central_up, self.truth.data.size, central, central, streams[0]
+        )
+        self._down = line(network.central_down, n + 1, central, embedded, streams[1])
+        self._drive = line(network.embedded_down, n + 1, embedded, embedded, streams[2])
+        self._torque = None
+        if network.embedded_up is not None:
+            self._torque = line(network.embedded_up, n, embedded, embedded, streams[3])
+
+    # Start -------------------------------------------------------------------------------------
+    def prepare(
+        self, q: Array, v: Array, theta: Array | None, theta_dot: Array | None
+    ) -> None:
+        """Put the plant in its first state and fill the links with the first command."""
+        n, truth = self.robot.n, self.truth
+        stiffness = self.plant.actuators.spring_stiffness
+        for name, value in (("theta", theta), ("theta_dot", theta_dot)):
+            if value is not None:
+                _state(name, value, n)
+        self.plant.start(q, v, theta=theta, theta_dot=theta_dot)
+        first = np.zeros(n)
+        guess = q[-n:].copy() if theta is None else np.asarray(theta, dtype=float)
+        for _ in range(1 if theta is not None else 50):
+            self._sense(0.0)
+            truth.theta[:], truth.tau_sea[:] = guess, stiffness * (guess - q[-n:])
+            self.controller.reset(0.0, truth)
+            self.controller.tick(0.0, truth, first)
+            if theta is None:
+                moved = float(np.abs(q[-n:] + first / stiffness - guess).max(initial=0.0))
+                guess = q[-n:] + first / stiffness
+                if moved < 1e-12:
+                    break
+        if not np.isfinite(guess).all():
+            raise InputError(
+                "the springs have no rest under the controller's first command; give theta"
+            )
+        if theta is None:
+            self.plant.start(q, v, theta=guess, theta_dot=theta_dot)
+        self._sense(0.0)
+        self.controller.reset(0.0, truth)
+        self._up.fill(truth.data)
+        self.command[1:] = first
+        self._down.fill(self.command)
+        self._drive.fill(self.command)
+        self._torque_held[:] = self.plant.tau_sea
+        if self._torque is not None:
+            self._torque.fill(self._torque_held)
+        self._fall_reference()
+
+    def _fall_reference(self) -> None:
+        if self.robot.nv_base == 6 and self.scene.fall is not None:
+            height = self._base_height()
+            self._fall_height = self.scene.fall.height_fraction * height
+            self._upright = _vertical(self.plant.q)
+
+    def _base_height(self) -> float:
+        x, y, z = self.plant.q[:3].tolist()
+        return z - self.scene.ground.height(x, y)
+
+    # Motion ------------------------------------------------------------------------------------
+    def run(
+        self, duration: float, log_period: float, progress: Callable[[float], None] | None
+    ) -> Run:
+        """Simulate and log until the end, whatever ends it."""
+        if not (math.isfinite(duration) and duration > 0):
+            raise InputError(f"the duration must be a time > 0 s, got {duration}")
+        steps = round(duration / self.clock.physics)
+        if steps < 1:
+            raise InputError(
+                f"the duration {duration} s is shorter than a step of {self.clock.physics} s"
+            )
+        every = self.clock.steps_of("log", log_period)
+        log = self._allocate(steps // every + 2)
+        outcome, message = Outcome.COMPLETED, ""
+        shown = max(1, round(0.1 / self.clock.physics))
+        try:
+            for i in range(steps):
+                self._control(i)
+                if i % every == 0:
+                    self._record(log)
+                self._push(i)
+                self.plant.step(self.acting[1:], self._torque_held)
+                if progress is not None and i % shown == 0:
+                    progress(self.plant.time)
+            self._sense(self.plant.time)
+            self._record(log)
+        except PlantStop as stop:
+            outcome, message = stop.outcome, stop.message
+        except SealagError as error:
+            outcome = Outcome.CONTROLLER_FAILED
+            message = f"at t = {self.plant.time:.4f} s: {error}"
+        except KeyboardInterrupt:
+            outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
+        return self._result(log, outcome, message)
+
+    def _control(self, i: int) -> None:
+        """Exchange what is due at physics step i."""
+        t = i * self.clock.physics
+        if i % self._central_steps == 0:
+            self._watch()
+            self._sense(t)
+            self._up.send(t, self.truth.data)
+            self._up.receive(t, self.received.data)
+            self.controller.tick(t, self.received, self.command[1:])
+            self.command[0] = t
+            if not math.isfinite(self.command.sum()):
+                raise PlantStop(
+                    Outcome.CONTROLLER_FAILED, f"the command at t = {t:.4f} s is not finite"
+                )
+            self._down.send(t, self.command)
+        if i % self._embedded_steps == 0:
+            self._down.receive(t, self._passing)
+            self._drive.send(t, self._passing)
+            self._drive.receive(t, self.acting)
+            if self._torque is not None:
+                self._torque.send(t, self.plant.tau_sea)
+                self._torque.receive(t, self._torque_held)
+
+    def _sense(self, t: float) -> None:
+        truth, plant = self.truth, self.plant
+        truth.data[0] = t
+        truth.q[:] = plant.q
+        truth.v[:] = plant.v
+        truth.theta[:] = plant.theta
+        truth.theta_dot[:] = plant.theta_dot
+        truth.tau_sea[:] = plant.tau_sea
+        truth.contact[:] = plant.contacts.loaded()
+
+    def _watch(self) -> None:
+        """End the run when the robot has fallen or left any physical range."""
+        plant = self.plant
+        stretch = float(np.abs(plant.theta - plant.q[-self.robot.n :]).max(initial=0.0))
+        if not (float(np.abs(plant.v).max(initial=0.0)) < 1e4 and stretch < 100.0):
+            raise PlantStop(
+                Outcome.DIVERGED,
+                f"velocities or spring deflections left any physical range at t = "
+                f"{plant.time:.4f} s",
+            )
+        if self._fall_height > -np.inf and self.scene.fall is not None:
+            height = self._base_height()
+            tilt = math.acos(min(1.0, float(_vertical(plant.q) @ self._upright)))
+            if height < self._fall_height or tilt > self.scene.fall.tilt:
+                raise PlantStop(
+                    Outcome.FELL,
+                    f"the base is {height:.2f} m above the ground and tilted by {tilt:.2f} rad at "
+                    f"t = {plant.time:.3f} s",
+                )
+
+    def _push(self, i: int) -> None:
+        if not self._pushes:
+            return
+        load = self.plant.load
+        load[:] = 0.0
+        step = self.clock.physics
+        for frame, push in self._pushes:
+            if round(push.start / step) <= i < round((push.start + push.duration) / step):
+                load[frame] += push.force
+
+    # Storage -----------------------------------------------------------------------------------
+    def _allocate(self, rows: int) -> Log:
+        robot, count = self.robot, self.plant.contacts.count
+        n = robot.n
+        widths = dict(
+            time=1, q=robot.nq, v=robot.nv, theta=n, theta_dot=n, tau_sea=n, tau_motor=n,
+            tau_command=n, tau_osc=n, measurement_age=1, command_age=1, mode=count,
+            force=3 * count, stores=len(STORES), joint=len(JOINT_FLOWS) * n,
+            scalar=len(SCALAR_FLOWS), residual=1, throughput=1, storage=1,
+        )  # fmt: skip
+        return Log(rows, widths)
+
+    def _record(self, log: Log) -> None:
+        plant, ledger, t = self.plant, self.plant.ledger, self.plant.time
+        storage = 0.0
+        if self._storing is not None:
+            self._sense(t)
+            storage = self._storing.storage(t, self.truth)
+        log.row(
+            t, plant.q, plant.v, plant.theta, plant.theta_dot, plant.tau_sea,
+            plant.motor_torque, self.command[1:], self.acting[1:],
+            self.command[0] - self.received.data[0], t - self.acting[0],
+            plant.contacts.mode, plant.force.ravel(), ledger.stores, ledger.joint.ravel(),
+            ledger.scalar, ledger.residual, ledger.throughput, storage,
+        )  # fmt: skip
+
+    def _result(self, log: Log, outcome: Outcome, message: str) -> Run:
+        robot, contacts = self.robot, self.plant.contacts
+        n, count = robot.n, contacts.count
+        time = log.column("time")
+        actuators = self.plant.actuators
+        names = ("theta", "theta_dot", "tau_sea", "tau_motor", "tau_command", "tau_osc")
+        return Run(
+            outcome=outcome,
+            message=message,
+            seed=self.seed,
+            joints=tuple(robot.joints),
+            feet=tuple(contacts.feet[f].contact.frame for f in contacts.foot_of),
+            time=time,
+            q=log.column("q", robot.nq),
+            v=log.column("v", robot.nv),
+            **{name: log.column(name, n) for name in names},
+            measurement_age=log.column("measurement_age"),
+            command_age=log.column("command_age"),
+            contact_mode=log.column("mode", count).astype(np.int64),
+            contact_force=log.column("force", count, 3),
+            events=tuple(self.plant.events),
+            audit=audit(
+                time=time,
+                joints=tuple(robot.joints),
+                stores=log.column("stores", len(STORES)),
+                joint=log.column("joint", len(JOINT_FLOWS), n),
+                scalar=log.column("scalar", len(SCALAR_FLOWS)),
+                residual=log.column("residual"),
+                throughput=log.column("throughput"),
+                storage=log.column("storage") if self._storing is not None else None,
+                shaped=0.5 * log.column("theta_dot", n) ** 2 @ actuators.shaped_inertia,
+                ratio=actuators.rotor_inertia / actuators.shaped_inertia,
+            ),
+        )
+
+
+def _vertical(q: Array) -> Array:
+    """Return the base's z axis in the world (3,)."""
+    x, y, z, w = q[3:7].tolist()
+    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])

@@ -1,0 +1,86 @@
+"""What a run leaves behind: arrays over its logged instants, its events and its end."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.simulation._audit import Audit
+from sealag.simulation._outcome import Outcome
+from sealag.simulation._plant import ContactEvent
+from sealag.typing import Array, IntArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """A simulated run, N logged instants; SI units.
+
+    Attributes:
+        outcome: How it ended.
+        message: One sentence about the end; empty when completed.
+        seed: Seed of jitter and losses.
+        joints: Names of the n actuated joints.
+        feet: Frame of each of the P contact points.
+        time: Instants (N,), s.
+        q: Configurations (N, nq).
+        v: Velocities (N, nv).
+        theta: Motor angles (N, n), rad.
+        theta_dot: Motor speeds (N, n), rad/s.
+        tau_sea: Spring torques (N, n), Nm.
+        tau_motor: Motor torques (N, n), Nm.
+        tau_command: Command that the central controller last sent (N, n), Nm.
+        tau_osc: Command as it acts at the motors, delayed (N, n), Nm.
+        measurement_age: Age of the measurement behind ``tau_command`` (N,), s.
+        command_age: Age of the command in ``tau_osc`` (N,), s.
+        contact_mode: 0 open, 1 sticking, 2 slipping (N, P).
+        contact_force: Forces in the contact frames, normal last (N, P, 3), N.
+        events: Touchdowns and lift-offs in order.
+        audit: Where every joule went.
+    """
+
+    outcome: Outcome
+    message: str
+    seed: int
+    joints: tuple[str, ...]
+    feet: tuple[str, ...]
+    time: Array
+    q: Array
+    v: Array
+    theta: Array
+    theta_dot: Array
+    tau_sea: Array
+    tau_motor: Array
+    tau_command: Array
+    tau_osc: Array
+    measurement_age: Array
+    command_age: Array
+    contact_mode: IntArray
+    contact_force: Array
+    events: tuple[ContactEvent, ...]
+    audit: Audit
+
+
+class Log:
+    """Rows of a run, allocated once.
+
+    Args:
+        rows: How many instants there will be at most.
+        widths: Length of each named column.
+    """
+
+    def __init__(self, rows: int, widths: dict[str, int]) -> None:
+        ends = np.cumsum(list(widths.values()))
+        self._table = np.zeros((rows, int(ends[-1])))
+        self._slices = dict(zip(widths, map(slice, [0, *ends[:-1].tolist()], ends.tolist())))
+        self.filled = 0
+
+    def row(self, *columns: Array | float) -> None:
+        """Append one row, its columns in the order of the widths."""
+        row = self._table[self.filled]
+        for place, column in zip(self._slices.values(), columns):
+            row[place] = column
+        self.filled += 1
+
+    def column(self, name: str, *shape: int) -> Array:
+        """Return what was filled of a column (N, *shape)."""
+        block = self._table[: self.filled, self._slices[name]]
+        return np.ascontiguousarray(block).reshape(self.filled, *shape)
