@@ -1,1 +1,19 @@
-"""sealag.actuation."""
+"""Series elastic actuators with their embedded controller, and how transparent they are."""
+
+from sealag.actuation._actuators import Actuators, actuators, joint_values
+from sealag.actuation._transparency import (
+    Transparency,
+    deviation_rms,
+    torque_transfer,
+    transparency,
+)
+
+__all__ = [
+    "Actuators",
+    "Transparency",
+    "actuators",
+    "deviation_rms",
+    "joint_values",
+    "torque_transfer",
+    "transparency",
+]

@@ -1,1 +1,23 @@
-"""sealag.delay."""
+"""Delays over time, the bounds that the criterion needs, and links that carry packets late."""
+
+from sealag.delay._line import DelayLine, Link, PacketOrder
+from sealag.delay._signal import (
+    Constant,
+    Delays,
+    DelaySignal,
+    Sinusoid,
+    Table,
+    measured,
+)
+
+__all__ = [
+    "Constant",
+    "DelayLine",
+    "DelaySignal",
+    "Delays",
+    "Link",
+    "PacketOrder",
+    "Sinusoid",
+    "Table",
+    "measured",
+]

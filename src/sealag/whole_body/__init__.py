@@ -1,5 +1,43 @@
-"""sealag.whole_body."""
+"""The whole-body controller: tasks, contact-consistent matrices, and what it feeds back."""
 
+from sealag.whole_body._linearise import Linearisation, linearise
 from sealag.whole_body._protocol import Measurement, StoringController, TickController
+from sealag.whole_body._stack import (
+    RANK_TOLERANCE,
+    WholeBodyStack,
+    evaluate,
+    relative_asymmetry,
+)
+from sealag.whole_body._static_joint import StaticJointState, static_joint_state
+from sealag.whole_body._tasks import (
+    Feedback,
+    GravityCompensation,
+    Hierarchy,
+    StiffnessForm,
+    Task,
+    TaskInertia,
+    TaskKind,
+    stiffness_matrix,
+)
 
-__all__ = ["Measurement", "StoringController", "TickController"]
+__all__ = [
+    "RANK_TOLERANCE",
+    "Feedback",
+    "GravityCompensation",
+    "Hierarchy",
+    "Linearisation",
+    "Measurement",
+    "StaticJointState",
+    "StiffnessForm",
+    "StoringController",
+    "Task",
+    "TaskInertia",
+    "TaskKind",
+    "TickController",
+    "WholeBodyStack",
+    "evaluate",
+    "linearise",
+    "relative_asymmetry",
+    "static_joint_state",
+    "stiffness_matrix",
+]

@@ -1,0 +1,256 @@
+"""Delays as functions of time, and the three delays of the paper's criterion."""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol, overload
+
+import numpy as np
+
+from sealag.errors import InputError
+from sealag.typing import Array, ArrayLike
+from sealag.units import check_delay_s
+
+
+class DelaySignal(Protocol):
+    """A round-trip or one-way delay that may vary with time."""
+
+    @property
+    def upper_bound(self) -> float:
+        """Return the largest delay that occurs, s."""
+        ...
+
+    @property
+    def mean(self) -> float:
+        """Return the mean delay, s."""
+        ...
+
+    @overload
+    def at(self, t: float) -> float: ...
+    @overload
+    def at(self, t: Array) -> Array: ...
+    def at(self, t: float | Array) -> float | Array:
+        """Return the delay of what is sent at an instant.
+
+        Args:
+            t: the instant or instants, s.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A delay that does not vary.
+
+    Attributes:
+        value: s.
+
+    Raises:
+        InputError: it is negative, not finite, or so long that a unit must be wrong.
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        """Check the value."""
+        check_delay_s(self.value, "The constant delay")
+
+    @property
+    def upper_bound(self) -> float:
+        """The value itself, s."""
+        return self.value
+
+    @property
+    def mean(self) -> float:
+        """The value itself, s."""
+        return self.value
+
+    def at(self, t: float | Array) -> float | Array:
+        """Return the value, for each instant of t.
+
+        Args:
+            t: s.
+        """
+        return self.value if np.ndim(t) == 0 else np.full(np.shape(t), self.value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sinusoid:
+    """mean + amplitude · sin(angular_frequency · t + phase), as in the paper's simulations.
+
+    Attributes:
+        mean: s.
+        amplitude: s, at most the mean.
+        angular_frequency: rad/s.
+        phase: rad.
+
+    Raises:
+        InputError: the delay would be negative somewhere, is not finite, or has a wrong unit.
+    """
+
+    mean: float
+    amplitude: float
+    angular_frequency: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        check_delay_s(self.mean, "The sinusoid's mean delay")
+        check_delay_s(self.amplitude, "The sinusoid's amplitude")
+        check_delay_s(self.mean + self.amplitude, "The sinusoid's largest delay")
+        if self.amplitude > self.mean:
+            raise InputError(
+                f"The sinusoid's amplitude {self.amplitude:g} s exceeds its mean {self.mean:g} s, "
+                "so that the delay would become negative."
+            )
+        if not (math.isfinite(self.angular_frequency) and math.isfinite(self.phase)):
+            raise InputError("The sinusoid's angular frequency and phase must be finite.")
+
+    @property
+    def upper_bound(self) -> float:
+        """The mean plus the amplitude, s."""
+        return self.mean + self.amplitude
+
+    def at(self, t: float | Array) -> float | Array:
+        """Return the delay.
+
+        Args:
+            t: s.
+        """
+        return self.mean + self.amplitude * np.sin(self.angular_frequency * t + self.phase)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A delay given at instants, linear between them and held outside.
+
+    Attributes:
+        time: (N,) s, increasing.
+        delay: (N,) s.
+
+    Raises:
+        InputError: lengths differ, time does not increase, or a delay cannot be one.
+    """
+
+    time: Array
+    delay: Array
+
+    def __post_init__(self) -> None:
+        """Check the arrays."""
+        time, delay = np.asarray(self.time, float), np.asarray(self.delay, float)
+        if time.ndim != 1 or time.shape != delay.shape or len(time) == 0:
+            raise InputError("A delay table needs as many times as delays, at least one.")
+        if not np.isfinite(time).all() or (np.diff(time) <= 0.0).any():
+            raise InputError("The times of a delay table must be finite and increase.")
+        for value in delay:
+            check_delay_s(float(value), "A delay of the table")
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "delay", delay)
+
+    @property
+    def upper_bound(self) -> float:
+        """The largest entry, s."""
+        return float(self.delay.max())
+
+    @property
+    def mean(self) -> float:
+        """The mean over the table's time, s."""
+        if len(self.time) == 1:
+            return float(self.delay[0])
+        area = np.sum(0.5 * (self.delay[1:] + self.delay[:-1]) * np.diff(self.time))
+        return float(area / (self.time[-1] - self.time[0]))
+
+    def at(self, t: float | Array) -> float | Array:
+        """Return the interpolated delay.
+
+        Args:
+            t: s.
+        """
+        value = np.interp(t, self.time, self.delay)
+        return float(value) if np.ndim(t) == 0 else value
+
+
+def measured(samples: ArrayLike, *, period: float, quantile: float = 1.0) -> Table:
+    """Make a delay signal from measured round-trip times.
+
+    Args:
+        samples: (N,) measured delays, s.
+        period: time between them, s.
+        quantile: samples above this quantile are cut to it; 1 keeps all. Below 1 the bound
+            covers only that share of the samples.
+
+    Returns:
+        The samples as a table that starts at 0.
+
+    Raises:
+        InputError: there are no samples, one cannot be a delay, or period or quantile is wrong.
+    """
+    values = np.asarray(samples, dtype=float)
+    if values.ndim != 1 or len(values) == 0:
+        raise InputError("Measured delays need at least one sample.")
+    if not (math.isfinite(period) and period > 0.0) or not 0.0 < quantile <= 1.0:
+        raise InputError("Measured delays need a positive period and a quantile in (0, 1].")
+    cut = float(np.quantile(values, quantile)) if quantile < 1.0 else np.inf
+    return Table(time=np.asarray(np.arange(len(values)) * period, dtype=np.float64), delay=np.minimum(values, cut))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Delays:
+    """The delays of both loops, and what the criterion needs of them.
+
+    d_0 = d_1 = T_H + T_L/2 is the total delay of the position feedback, d_2 = (T_H + T_L)/2 that
+    of the feedforward path. A sampled controller's zero-order hold adds its period to each. With
+    asymmetric links only d_2 changes: d_1 is the sum around the loop.
+
+    Attributes:
+        central: T_H, round trip of the central loop.
+        embedded: T_L, round trip of the embedded loop.
+        sample_time: period of the central controller, 0 for a continuous one, s.
+        up_share: share of each round trip that lies between controller and motor.
+    """
+
+    central: DelaySignal
+    embedded: DelaySignal
+    sample_time: float = 0.0
+    up_share: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            InputError: the sample time cannot be one, or the share is outside 0 … 1.
+        """
+        check_delay_s(self.sample_time, "The sample time")
+        if not 0.0 <= self.up_share <= 1.0:
+            raise InputError(f"up_share is {self.up_share:g}; it must lie in 0 … 1.")
+
+    @property
+    def d_0(self) -> float:
+        """Upper bound of T_H + T_L/2 plus the hold, s."""
+        return self.d_1
+
+    @property
+    def d_1(self) -> float:
+        """Upper bound of the position feedback's total delay, s."""
+        return self.central.upper_bound + 0.5 * self.embedded.upper_bound + self.sample_time
+
+    @property
+    def d_2(self) -> float:
+        """Upper bound of the feedforward path's delay, s."""
+        both = self.central.upper_bound + self.embedded.upper_bound
+        return self.up_share * both + self.sample_time
+
+    def d_1_at(self, t: float | Array) -> float | Array:
+        """Return the position feedback's total delay with its mean hold of half a period.
+
+        Args:
+            t: s.
+        """
+        return self.central.at(t) + 0.5 * self.embedded.at(t) + 0.5 * self.sample_time
+
+    def d_2_at(self, t: float | Array) -> float | Array:
+        """Return the feedforward path's delay with its mean hold of half a period.
+
+        Args:
+            t: s.
+        """
+        return self.up_share * (self.central.at(t) + self.embedded.at(t)) + 0.5 * self.sample_time

@@ -1,0 +1,256 @@
+"""Operational-space tasks and their order of priority."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from itertools import groupby
+
+import numpy as np
+
+from sealag.errors import InputError
+from sealag.robot import Robot, TermRows
+from sealag.typing import Array, ArrayLike
+
+
+class TaskKind(StrEnum):
+    """What a task controls."""
+
+    COM = "com"
+    POSITION = "position"
+    ORIENTATION = "orientation"
+    POSE = "pose"
+    POSTURE = "posture"
+
+
+class StiffnessForm(StrEnum):
+    """How the stiffness S of a task follows from its gain K_x and the task inertia Λ.
+
+    symmetric: S = Λ^½ K_x Λ^½, always symmetric; published: S = Λ K_x as in Eq. (11), in general
+    not symmetric; force: S = K_x, a stiffness in N/m and Nm/rad.
+    """
+
+    SYMMETRIC = "symmetric"
+    PUBLISHED = "published"
+    FORCE = "force"
+
+
+class Feedback(StrEnum):
+    """The signal that the controller feeds back.
+
+    motor: x(θ); static_joint: x(q̄(θ)) of Eqs. (15)-(17); static_joint_tank: the energy tank's x̂
+    with a flow that pays for all that u does; joint: x(q) of link-side angles.
+    """
+
+    MOTOR = "motor"
+    STATIC_JOINT = "static_joint"
+    STATIC_JOINT_TANK = "static_joint_tank"
+    JOINT = "joint"
+
+
+class GravityCompensation(StrEnum):
+    """Where gravity compensation takes its configuration from.
+
+    feedback: from the fed-back and delayed one, so that its gradient is part of the feedback;
+    planned: from the plan, so that it has no gradient; none: there is no compensation.
+    """
+
+    FEEDBACK = "feedback"
+    PLANNED = "planned"
+    NONE = "none"
+
+
+class TaskInertia(StrEnum):
+    """Which task inertia scales the gains.
+
+    lambda_ts: Λ_{t|s} = (J_{t|s} M⁻¹ J_{t|s}ᵀ)⁺ of Eq. (10); lambda_star: Λ* = (J* φ* J*ᵀ)⁺.
+    """
+
+    LAMBDA_TS = "lambda_ts"
+    LAMBDA_STAR = "lambda_star"
+
+
+_SIZE = {TaskKind.COM: 3, TaskKind.POSITION: 3, TaskKind.ORIENTATION: 3, TaskKind.POSE: 6}
+_NEEDS_FRAME = {TaskKind.POSITION, TaskKind.ORIENTATION, TaskKind.POSE}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """One task of a hierarchy.
+
+    Attributes:
+        name: what messages and plots call it.
+        kind: what it controls.
+        stiffness: K_x, (m, m); a scalar or m numbers become its diagonal. 1/s² where the task
+            inertia scales it, else N/m and Nm/rad.
+        frame: the controlled frame, for position, orientation and pose.
+        joints: the controlled joints, for posture; empty means all.
+        axes: which rows are controlled, out of x, y, z (then rotations about x, y, z for pose);
+            empty means all. World axes.
+        priority: 1 is the highest; tasks of equal priority share one level.
+    """
+
+    name: str
+    kind: TaskKind
+    stiffness: Array
+    frame: str | None = None
+    joints: tuple[str, ...] = ()
+    axes: tuple[int, ...] = ()
+    priority: int = 1
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a task.
+
+        Raises:
+            InputError: the frame is missing, axes do not exist, or the stiffness is not a
+                positive semidefinite matrix of the right size.
+        """
+        object.__setattr__(self, "kind", TaskKind(self.kind))
+        if self.kind in _NEEDS_FRAME and not self.frame:
+            raise InputError(f"Task {self.name}: a {self.kind} task needs a frame.")
+        size = _SIZE.get(self.kind)
+        if size and any(not 0 <= axis < size for axis in self.axes):
+            raise InputError(f"Task {self.name}: axes must lie in 0 … {size - 1}.")
+        if self.priority < 1:
+            raise InputError(f"Task {self.name}: priority is {self.priority}; 1 is the highest.")
+
+    def rows(self, robot: Robot) -> TermRows:
+        """Return which Jacobian rows of a robot the task uses.
+
+        Args:
+            robot: the robot.
+
+        Raises:
+            UnknownNameError: the frame or a joint does not exist.
+        """
+        if self.kind is TaskKind.POSTURE:
+            names = self.joints or robot.joints
+            return TermRows(
+                frame=None, rows=tuple(robot.joint_index(name) for name in names), of_joints=True
+            )
+        axes = self.axes or tuple(range(_SIZE[self.kind]))
+        if self.kind is TaskKind.COM:
+            return TermRows(frame=None, rows=axes)
+        frame = robot.check_frame(self.frame or "")
+        shift = 3 if self.kind is TaskKind.ORIENTATION else 0
+        return TermRows(frame=frame, rows=tuple(axis + shift for axis in axes))
+
+    def gain(self, size: int) -> Array:
+        """Return K_x as a matrix.
+
+        Args:
+            size: number of rows m.
+
+        Returns:
+            (m, m) symmetric positive semidefinite matrix.
+
+        Raises:
+            InputError: the stiffness has another size, is not finite, not symmetric or negative.
+        """
+        return stiffness_matrix(self.stiffness, size, what=f"Task {self.name}: stiffness")
+
+
+def stiffness_matrix(values: ArrayLike, size: int, *, what: str) -> Array:
+    """Return a scalar, a diagonal or a matrix of gains as a matrix.
+
+    Args:
+        values: (), (m,) or (m, m).
+        size: m.
+        what: how messages begin.
+
+    Raises:
+        InputError: it has another shape, is not finite, not symmetric or not positive
+            semidefinite.
+    """
+    array = np.asarray(values, dtype=float)
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} has entries that are not finite numbers.")
+    if array.ndim == 0:
+        array = np.full(size, float(array))
+    if array.shape == (size,):
+        if (array < 0.0).any():
+            raise InputError(f"{what} has a negative entry ({array.min():g}); 0 or more is right.")
+        return np.diag(array)
+    if array.shape != (size, size):
+        raise InputError(
+            f"{what} has shape {array.shape}; one number, {size} numbers or a {size} x {size} "
+            "matrix are right."
+        )
+    if not np.allclose(array, array.T, rtol=1e-12, atol=0.0):
+        raise InputError(f"{what} is not a symmetric matrix.")
+    if np.linalg.eigvalsh(array)[0] < -1e-12 * np.abs(array).max():
+        raise InputError(f"{what} is not positive semidefinite.")
+    return array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hierarchy:
+    """Tasks in order of priority, and how their gains become stiffness.
+
+    Attributes:
+        tasks: the tasks; those of equal priority share a level, in the order given.
+        form: how the stiffness follows from gain and inertia.
+        task_inertia: which inertia that is.
+    """
+
+    tasks: tuple[Task, ...]
+    form: StiffnessForm = StiffnessForm.SYMMETRIC
+    task_inertia: TaskInertia = TaskInertia.LAMBDA_TS
+    ordered: tuple[Task, ...] = field(init=False, repr=False)
+    """The tasks by priority."""
+
+    def __post_init__(self) -> None:
+        """Sort the tasks.
+
+        Raises:
+            InputError: there is none, or two have one name.
+        """
+        if not self.tasks:
+            raise InputError("The hierarchy has no tasks; at least one is needed.")
+        names = [task.name for task in self.tasks]
+        if len(set(names)) < len(names):
+            raise InputError("Two tasks of the hierarchy have the same name.")
+        ordered = tuple(sorted(self.tasks, key=lambda task: task.priority))
+        object.__setattr__(self, "ordered", ordered)
+
+    def rows(self, robot: Robot) -> list[TermRows]:
+        """Return the Jacobian rows of all tasks, by priority.
+
+        Args:
+            robot: the robot.
+        """
+        return [task.rows(robot) for task in self.ordered]
+
+    def levels(self, robot: Robot) -> list[int]:
+        """Return the first row of each level, then the number of rows.
+
+        Args:
+            robot: the robot.
+        """
+        ends = [0]
+        for _, tasks in groupby(self.ordered, key=lambda task: task.priority):
+            ends.append(ends[-1] + sum(len(task.rows(robot).rows) for task in tasks))
+        return ends
+
+    def gain(self, robot: Robot) -> Array:
+        """Return K_x of all tasks, (m, m), blocks by priority on the diagonal.
+
+        Args:
+            robot: the robot.
+        """
+        return block_diagonal([t.gain(len(t.rows(robot).rows)) for t in self.ordered])
+
+
+def block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Return the matrix with square blocks on its diagonal.
+
+    Args:
+        blocks: (m_i, m_i) each.
+    """
+    size = sum(len(block) for block in blocks)
+    out = np.zeros((size, size))
+    first = 0
+    for block in blocks:
+        last = first + len(block)
+        out[first:last, first:last] = block
+        first = last
+    return out
