@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
 
 import numpy as np
 
+from sealag.delay._signal import DelaySignal
 from sealag.errors import InputError
 from sealag.typing import Array
 
@@ -24,13 +24,6 @@ class PacketOrder(StrEnum):
     """Packets overtake; the receiver takes each as it comes, even an old one."""
 
 
-class _Delay(Protocol):
-    @property
-    def upper_bound(self) -> float: ...
-
-    def at(self, t: Array) -> Array: ...
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
     """One direction of one network connection; the receiver holds the last packet it took.
@@ -46,7 +39,7 @@ class Link:
         InputError: A value is negative, not finite, or the loss is not below 1.
     """
 
-    delay: _Delay
+    delay: DelaySignal
     jitter: float = 0.0
     loss: float = 0.0
     max_burst: int = 10

@@ -135,6 +135,8 @@ def _friction(G, b, owner, size, mu, yielding, f):
     H = np.empty((size, size))
     L = np.zeros((size, size))
     slope = np.empty(size)
+    low = np.zeros(mu.size)
+    high = np.full(mu.size, np.inf)
     for _ in range(_ITERATIONS):
         for r in range(size):
             for k in range(size):
@@ -153,69 +155,135 @@ def _friction(G, b, owner, size, mu, yielding, f):
                 continue
             normal = f[r]
             tangent = math.hypot(f[r - 2], f[r - 1])
-            if normal <= 0.0:
-                loose = 1e9 * G[r, r]
-                settled = settled and yielding[i] == loose
-                yielding[i] = loose
-                continue
             excess = tangent - mu[i] * normal
-            if abs(excess) <= _CONE * mu[i] * normal or (excess < 0.0 and yielding[i] == 0.0):
+            if abs(excess) <= _CONE * abs(mu[i] * normal) or (excess < 0.0 and yielding[i] == 0.0):
                 continue
             settled = False
-            slope[:] = 0.0
-            slope[r - 2], slope[r - 1] = -f[r - 2], -f[r - 1]
-            _forward(L, slope)
-            _backward(L, slope)
-            along = (f[r - 2] * slope[r - 2] + f[r - 1] * slope[r - 1]) / tangent
-            ratio = mu[i] * normal / tangent
-            rate = mu[i] * slope[r] / tangent - ratio * along / tangent
-            if rate > 0.0:
-                yielding[i] = max(0.0, yielding[i] + (1.0 - ratio) / rate)
+            if excess > 0.0:
+                low[i] = yielding[i]
             else:
-                yielding[i] = 2.0 * yielding[i] + G[r, r]
+                high[i] = yielding[i]
+            guess = np.inf
+            if normal > 0.0 and tangent > 0.0:
+                slope[:] = 0.0
+                slope[r - 2], slope[r - 1] = -f[r - 2], -f[r - 1]
+                _forward(L, slope)
+                _backward(L, slope)
+                along = (f[r - 2] * slope[r - 2] + f[r - 1] * slope[r - 1]) / tangent
+                ratio = mu[i] * normal / tangent
+                rate = (mu[i] * slope[r] - ratio * along) / tangent
+                if rate > 0.0:
+                    guess = yielding[i] + (1.0 - ratio) / rate
+                    if low[i] == 0.0 and guess < 0.0:
+                        guess = 0.0
+            yielding[i] = _inside(guess, low[i], high[i], G[r, r])
+            if high[i] - low[i] <= 1e-14 * high[i]:  # moved by the other points: begin again
+                low[i], high[i] = 0.0, np.inf
         if settled:
             break
     return True
 
 
 @njit(cache=True)
-def solve(L, rows, free, target, closed, mu, yielding, x, force):
+def _inside(guess, low, high, scale):
+    """Keep an iterate inside its bracket, else divide the bracket geometrically."""
+    if low < guess < high or (guess == 0.0 and low == 0.0):
+        return guess
+    if high == np.inf:
+        return 4.0 * low + scale
+    return math.sqrt(max(low, 1e-12 * high) * high)
+
+
+@njit(cache=True)
+def twist(L, J_frame, v, C, foot_of, rows, spin):
+    """Write L⁻¹ Jᵀ of every foot's turn about its normal (F, nv) and its rate (F,), rad/s."""
+    spin[:] = 0.0
+    last = -1
+    for i in range(foot_of.size):
+        f = foot_of[i]
+        if f == last:
+            continue
+        last = f
+        for c in range(v.size):
+            s = 0.0
+            for a in range(3):
+                s += C[i, 2, a] * J_frame[f, 3 + a, c]
+            rows[f, c] = s
+            spin[f] += s * v[c]
+        _forward(L, rows[f])
+
+
+@njit(cache=True)
+def _twist_torque(force, closed, foot_of, torsion, spin, torque):
+    """Write -clip(c spin) within the radius times the normal load; return the largest change."""
+    change = 0.0
+    for f in range(spin.size):
+        load = 0.0
+        for i in range(closed.size):
+            if foot_of[i] == f and closed[i] and force[i, 2] > 0.0:
+                load += force[i, 2]
+        limit = torsion[f, 1] * load if load > 0.0 else 0.0
+        new = -min(max(torsion[f, 0] * spin[f], -limit), limit)
+        change = max(change, abs(new - torque[f]))
+        torque[f] = new
+    return change
+
+
+@njit(cache=True)
+def solve(
+    L, rows, free, target, closed, mu, yielding, foot_of, torsion, twist_rows, spin, x, force
+):
     """Meet the contact conditions of the closed points.
 
     ``free`` (nv,) is L⁻¹ times the unconstrained right side, ``yielding`` (P,) a first guess that
-    is improved. Writes x (nv,) and force (P, 3); returns False if there is no solution.
+    is improved, ``torsion`` (F, 2) friction torque about the normal: per rate, and per normal
+    force. Writes x (nv,) and force (P, 3); returns False if there is no solution.
     """
     count = 3 * closed.size
     G = np.empty((count, count))
     b = np.empty(count)
     f = np.empty(count)
     owner = np.empty((count, 2), np.int64)
-    size = _assemble(rows, free, target, closed, mu, owner, G, b)
-    force[:] = 0.0
-    x[:] = free
-    if size > 0:
-        if not _friction(G, b, owner, size, mu, yielding, f[:size]):
+    torque = np.zeros(spin.size)
+    _twist_torque(force, closed, foot_of, torsion, spin, torque)
+    for _ in range(_ITERATIONS):
+        x[:] = free
+        for k in range(spin.size):
+            if torque[k] != 0.0:
+                for c in range(x.size):
+                    x[c] += twist_rows[k, c] * torque[k]
+        size = _assemble(rows, x, target, closed, mu, owner, G, b)
+        force[:] = 0.0
+        if size > 0 and not _friction(G, b, owner, size, mu, yielding, f[:size]):
             return False
         for r in range(size):
             i, a = owner[r]
             force[i, a] = f[r]
             for c in range(x.size):
                 x[c] += rows[i, a, c] * f[r]
+        if _twist_torque(force, closed, foot_of, torsion, spin, torque) < 1e-10:
+            break
     _backward(L, x)
     return True
 
 
 @njit(cache=True)
-def settle(L, rows, free, target, touching, closed, mu, yielding, tolerance, x, force):
+def settle(
+    L, rows, free, target, touching, closed, mu, yielding, foot_of, torsion, twist_rows, spin,
+    tolerance, x, force,
+):  # fmt: skip
     """Find which touching points are closed, so that none pulls and none sinks in.
 
-    Works on accelerations and forces, or on velocities and impulses (plastic impact). Starts from
-    ``closed`` and changes the worst point until nothing is violated. Returns 0 when settled, 1 if
-    no consistent set was found, 2 if the equations have no solution.
+    Works on accelerations and forces, or on velocities and impulses (plastic impact, without
+    torsion). Starts from ``closed`` and changes the worst point until nothing is violated. Returns
+    0 when settled, 1 if no consistent set was found, 2 if the equations have no solution.
     """
     count = closed.size
     for _ in range(8 * count + 8):
-        if not solve(L, rows, free, target, closed, mu, yielding, x, force):
+        if not solve(
+            L, rows, free, target, closed, mu, yielding, foot_of, torsion, twist_rows, spin,
+            x, force,
+        ):  # fmt: skip
             return 2
         worst, which = tolerance, -1
         for i in range(count):
@@ -273,28 +341,6 @@ def _contact_power(C, velocity, force, closed, out):
 
 
 @njit(cache=True)
-def _torsion(J_frame, v, torsion, C, closed, frame_of, right):
-    """Add the patch friction torque about the normal of every loaded foot; return its power."""
-    total = 0.0
-    done = -1
-    for i in range(closed.size):
-        f = frame_of[i]
-        if closed[i] == 0 or f == done or torsion[f, 0] == 0.0:
-            continue
-        done = f
-        spin = 0.0
-        for a in range(3):
-            for c in range(v.size):
-                spin += C[i, 2, a] * J_frame[f, 3 + a, c] * v[c]
-        torque = -min(max(torsion[f, 0] * spin, -torsion[f, 1]), torsion[f, 1])
-        total += torque * spin
-        for a in range(3):
-            for c in range(v.size):
-                right[c] += C[i, 2, a] * J_frame[f, 3 + a, c] * torque
-    return total
-
-
-@njit(cache=True)
 def evaluate(
     M, nle, frames, v, joint, motor, spring, shape, ground, rates, state, load, torsion, instant
 ):
@@ -304,15 +350,16 @@ def evaluate(
     ``joint`` link positions (n,), ``motor`` (n, 2) angle and speed, ``spring`` (K, D_s),
     ``shape`` (frame_of, offset), ``ground`` (C, anchor, mu), ``rates`` (stabilisation gain, stop
     time), ``state`` (closed, yielding), ``load`` forces (L, 3) on the points after the contact
-    points, ``torsion`` (F, 2) coefficient and limit. Writes ``instant``: tau, acceleration, force,
-    position, velocity, target, right, L, rows, power, J, drift; power: normal, tangential,
+    points, ``torsion`` as in ``solve``. Writes ``instant``: tau, acceleration, force, position,
+    velocity, target, right, L, rows, power, J, drift, twist_rows, spin; power: normal, tangential,
     torsional, load, and kinetic energy. Returns False if the equations have no solution.
     """
     J_frame, R, p, drift_frame = frames
     frame_of, offset = shape
     C, anchor, mu = ground
     closed, yielding = state
-    tau, acceleration, force, position, velocity, target, right, L, rows, power, J, drift = instant
+    tau, acceleration, force, position, velocity, target, right, L, rows = instant[:9]
+    power, J, drift, twist_rows, spin = instant[9:]
     points(J_frame, R, p, drift_frame, v, frame_of, offset, J, position, velocity, drift)
     nv, n, count = v.size, joint.size, closed.size
     for i in range(nv):
@@ -321,7 +368,6 @@ def evaluate(
         tau[i] = spring[0][i] * (motor[i, 0] - joint[i])
         tau[i] += spring[1][i] * (motor[i, 1] - v[nv - n + i])
         right[nv - n + i] += tau[i]
-    power[2] = _torsion(J_frame, v, torsion, C, closed, frame_of, right)
     power[3] = 0.0
     for k in range(load.shape[0]):
         for a in range(3):
@@ -337,8 +383,47 @@ def evaluate(
     if not cholesky(M, L):
         return False
     project(L, J, C, rows)
+    twist(L, J_frame, v, C, frame_of[:count], twist_rows, spin)
     free = right.copy()
     _forward(L, free)
-    solved = solve(L, rows, free, target, closed, mu, yielding, acceleration, force)
+    solved = solve(
+        L, rows, free, target, closed, mu, yielding, frame_of[:count], torsion, twist_rows, spin,
+        acceleration, force,
+    )  # fmt: skip
     _contact_power(C, velocity, force, closed, power)
+    torque = np.zeros(spin.size)
+    _twist_torque(force, closed, frame_of[:count], torsion, spin, torque)
+    power[2] = 0.0
+    for f in range(spin.size):
+        power[2] += torque[f] * spin[f]
     return solved
+
+
+def warm() -> None:
+    """Compile every kernel with the types used in practice."""
+    nv, M, none = 7, np.eye(7), np.zeros(0)
+    frames = (np.zeros((1, 6, nv)), np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, 6)))
+    frames[0][0, :6, :6] = np.eye(6)
+    shape = (np.zeros(1, np.int64), np.zeros((1, 3)))
+    ground = (np.eye(3)[None], np.zeros((1, 3)), np.ones(1))
+    state, rates = (np.ones(1, np.int64), np.zeros(1)), (50.0, 1e-3)
+    torsion, one = np.zeros((1, 2)), np.zeros((1, 3))
+    instant = (
+        np.zeros(1), np.zeros(nv), one, one.copy(), one.copy(), one.copy(), np.zeros(nv),
+        np.zeros((nv, nv)), np.zeros((1, 3, nv)), np.zeros(5), np.zeros((1, 3, nv)), one.copy(),
+        np.zeros((1, nv)), np.zeros(1),
+    )  # fmt: skip
+    v, spring = np.zeros(nv), (np.ones(1), np.zeros(1))
+    load = none.reshape(0, 3)
+    evaluate(
+        M, v, frames, v, np.zeros(1), np.zeros((1, 2)), spring, shape, ground, rates, state, load,
+        torsion, instant,
+    )  # fmt: skip
+    L, rows, closed = instant[7], instant[8], state[0]
+    project(L, instant[10], ground[0], rows)
+    demand(ground[0], one, one, one, one, 50.0, 1e-3, one.copy())
+    settle(
+        L, rows, v, one, closed, closed, ground[2], state[1], shape[0], torsion, instant[12],
+        instant[13], 1e-9, v.copy(), one.copy(),
+    )  # fmt: skip
+    margins(ground[0], one, one, np.zeros(1), closed, 1.0, np.zeros(1))

@@ -87,7 +87,7 @@ def _halvings(A, time):
         for i in range(SIZE):
             s += abs(A[i, j])
         norm = max(norm, s)
-    return max(0, int(math.ceil(math.log2(max(norm * time, 1e-30) / 0.25))))
+    return max(0, math.ceil(math.log2(max(norm * time, 1e-30) / 0.25)))
 
 
 @njit(cache=True)
@@ -341,3 +341,19 @@ def tally(parameters, work, powers, step, z, q, kinetic, gravity, joint, scalar,
     stores(parameters, z, q, kinetic, gravity, energy)
     for k in range(4):
         moved[0] += abs(energy[k] - before[k])
+
+
+def warm() -> None:
+    """Compile every kernel with the types used in practice."""
+    parameters = np.array([[350.0, 0.0, 0.1, 2.0, 10.0, 0.0, 0.1, np.inf, np.inf, np.inf]])
+    half, whole = np.empty((1, 4, SIZE, SIZE)), np.empty((1, 4, SIZE, SIZE))
+    forms = np.empty((1, 4, PRODUCTS, SIZE, SIZE))
+    tables(parameters, 1.0, 1e-3, half, whole, forms)
+    z, tau, work, ahead = np.zeros((1, SIZE)), np.zeros(1), np.zeros((1, 7)), np.zeros((1, 2, 2))
+    predict(parameters, 1.0, tau, tau, z, 1e-3, half, True, ahead)
+    link_cubic(z, tau, tau, tau, tau, 1e-3)
+    move(parameters, 1.0, tau, tau, z, 1e-3, whole, forms, True, work)
+    energy, joint, scalar = np.zeros(4), np.zeros((8, 1)), np.zeros(5)
+    stores(parameters, z, tau, 0.0, 0.0, energy)
+    powers = np.zeros((4, 5))
+    tally(parameters, work, powers, 1e-3, z, tau, 0.0, 0.0, joint, scalar, energy, np.zeros(1))

@@ -140,3 +140,11 @@ def _backward(L, x):
         for k in range(i + 1, x.size):
             s -= L[k, i] * x[k]
         x[i] = s / L[i, i]
+
+
+def warm() -> None:
+    """Compile every kernel with the types used in practice."""
+    q, v, rates = np.zeros(8), np.zeros(7), np.zeros((4, 7))
+    q[6] = 1.0
+    stage(q, v, rates[0], rates[1], 1e-3, 6, v.copy(), q.copy(), v.copy(), rates[2])
+    combine(q, v, rates, rates, 1e-3, 6, q.copy(), v.copy())

@@ -1,1 +1,30 @@
-"""sealag.simulation."""
+"""The delayed robot, simulated: plant, contact, links, closed loop and energy audit."""
+
+from sealag.simulation._audit import Audit, Passivity
+from sealag.simulation._ground import FlatGround, Foot, Ground
+from sealag.simulation._loop import closed_loop
+from sealag.simulation._network import Clock, Network
+from sealag.simulation._outcome import EventKind, Outcome, PlantStop
+from sealag.simulation._plant import ContactEvent, Plant
+from sealag.simulation._run import Run
+from sealag.simulation._scene import FallLimits, Push, Scene
+
+__all__ = [
+    "Audit",
+    "Clock",
+    "ContactEvent",
+    "EventKind",
+    "FallLimits",
+    "FlatGround",
+    "Foot",
+    "Ground",
+    "Network",
+    "Outcome",
+    "Passivity",
+    "Plant",
+    "PlantStop",
+    "Push",
+    "Run",
+    "Scene",
+    "closed_loop",
+]

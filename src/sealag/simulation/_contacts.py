@@ -62,17 +62,25 @@ class Contacts:
         self.closed = np.zeros(self.count, np.int64)
         self.yielding = np.zeros(self.count)
         self.state = (self.closed, self.yielding)
-        self.torsion = np.zeros((len(frames) + len(loaded_frames), 2))
+        self.torsion = np.zeros((len(feet), 2))
         for f, foot in enumerate(feet):
-            self.torsion[f] = foot.torsional_damping, foot.torsional_limit
+            self.torsion[f] = foot.torsional_damping, foot.torsional_radius
         self._weight = robot.mass * 9.81
         self._radius = np.array([feet[f].radius for f in self.foot_of])
-        self._margins = np.zeros(self.count)
+        self._margins, self._before = np.zeros(self.count), np.zeros(self.count)
 
     def open_all(self) -> None:
         """Open every contact."""
         self.closed[:] = 0
         self.yielding[:] = 0.0
+
+    def remember(self) -> None:
+        """Keep the sliding state of a step's beginning."""
+        self._before[:] = self.yielding
+
+    def recall(self) -> None:
+        """Return to the sliding state of the step's beginning."""
+        self.yielding[:] = self._before
 
     @property
     def mode(self) -> IntArray:
@@ -145,17 +153,18 @@ class Contacts:
         self._kernel.project(at.L, at.J, self.C, at.rows)
         yielding = np.zeros(self.count)
         none = np.zeros((self.count, 3))
-        self._settle(at, at.L.T @ at.v, none, mask, yielding, speed, impulse)
+        spinless = np.zeros(len(self.feet))
+        self._settle(at, at.L.T @ at.v, none, mask, yielding, spinless, speed, impulse)
         return speed, impulse
 
     def settle(self, at: Instant, mask: IntArray) -> None:
         """Find which touching points stay closed under the forces of this instant."""
         self._kernel.demand(
-            self.C, at.position, self.anchor, at.velocity, at.solved[-1], *self.rates, at.target
+            self.C, at.position, self.anchor, at.velocity, at.drift, *self.rates, at.target
         )
         self._kernel.project(at.L, at.J, self.C, at.rows)
-        free, x = np.linalg.solve(at.L, at.right), np.zeros_like(at.v)
-        self._settle(at, free, at.target, mask, self.yielding, x, np.zeros((self.count, 3)))
+        free, x, force = np.linalg.solve(at.L, at.right), np.zeros_like(at.v), at.force.copy()
+        self._settle(at, free, at.target, mask, self.yielding, at.spin, x, force)
 
     def _settle(
         self,
@@ -164,13 +173,14 @@ class Contacts:
         target: Array,
         mask: IntArray,
         yielding: Array,
+        spin: Array,
         x: Array,
         force: Array,
     ) -> None:
-        tolerance = 1e-9 * self._weight
         status = self._kernel.settle(
-            at.L, at.rows, free, target, mask, self.closed, self.mu, yielding, tolerance, x, force
-        )
+            at.L, at.rows, free, target, mask, self.closed, self.mu, yielding, self.foot_of,
+            self.torsion, at.twist_rows, spin, 1e-9 * self._weight, x, force,
+        )  # fmt: skip
         if status:
             touching = sorted({self.feet[self.foot_of[p]].contact.frame for p in mask.nonzero()[0]})
             raise PlantStop(

@@ -55,7 +55,7 @@ class Foot:
         half_length: Half the sole's length along the frame's x, m; SURFACE only.
         half_width: Half the sole's width along the frame's y, m; SURFACE only.
         torsional_damping: Friction torque about the normal per yaw rate, Nms/rad.
-        torsional_limit: Largest such torque, Nm.
+        torsional_radius: Largest such torque per normal force, m; the size of the patch.
 
     Raises:
         InputError: A value is negative or not a number, or a SURFACE foot has no size.
@@ -67,12 +67,12 @@ class Foot:
     half_length: float = 0.0
     half_width: float = 0.0
     torsional_damping: float = 0.0
-    torsional_limit: float = math.inf
+    torsional_radius: float = math.inf
 
     def __post_init__(self) -> None:
         for name in (
             "friction", "radius", "half_length", "half_width",
-            "torsional_damping", "torsional_limit",
+            "torsional_damping", "torsional_radius",
         ):  # fmt: skip
             value = getattr(self, name)
             if not value >= 0:
@@ -106,15 +106,15 @@ def contact_frame(ground: Ground, x: float, y: float) -> Array:
         return np.eye(3)
     normal_of = getattr(ground, "normal", None)
     if normal_of is not None:
-        normal = np.asarray(normal_of(x, y), dtype=float)
+        normal = np.array(normal_of(x, y), dtype=float)
     else:
         d = 1e-3
         slope_x = (ground.height(x + d, y) - ground.height(x - d, y)) / (2 * d)
         slope_y = (ground.height(x, y + d) - ground.height(x, y - d)) / (2 * d)
         normal = np.array([-slope_x, -slope_y, 1.0])
-    normal = normal / np.linalg.norm(normal)
+    normal /= float(np.linalg.norm(normal))
     first = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
     if np.linalg.norm(first) < 1e-6:
         first = np.array([0.0, 1.0, 0.0]) - normal[1] * normal
-    first /= np.linalg.norm(first)
+    first /= float(np.linalg.norm(first))
     return np.stack([first, np.cross(normal, first), normal])

@@ -26,11 +26,12 @@ class Instant:
     """
 
     __slots__ = (
-        "J", "L", "M", "acceleration", "force", "gap", "nle", "position", "potential", "power",
-        "q", "right", "rows", "solved", "target", "tau", "v", "velocity", "z",
+        "J", "L", "M", "acceleration", "drift", "force", "gap", "nle", "position", "potential",
+        "power", "q", "right", "rows", "solved", "spin", "target", "tau", "twist_rows", "v",
+        "velocity", "z",
     )  # fmt: skip
 
-    def __init__(self, robot: Robot, points: int, contacts: int) -> None:
+    def __init__(self, robot: Robot, *, points: int, contacts: int, feet: int) -> None:
         n, nv = robot.n, robot.nv
         self.q, self.v, self.z = np.zeros(robot.nq), np.zeros(nv), np.zeros((n, 9))
         self.M, self.nle, self.potential = np.zeros((nv, nv)), np.zeros(nv), 0.0
@@ -40,7 +41,11 @@ class Instant:
         self.gap, self.power = np.full(contacts, np.inf), np.zeros(5)
         self.right, self.L = np.zeros(nv), np.zeros((nv, nv))
         self.rows, self.J = np.zeros((contacts, 3, nv)), np.zeros((points, 3, nv))
+        self.drift, self.twist_rows, self.spin = (
+            np.zeros((points, 3)), np.zeros((feet, nv)), np.zeros(feet)
+        )  # fmt: skip
         self.solved = (
             self.tau, self.acceleration, self.force, self.position, self.velocity, self.target,
-            self.right, self.L, self.rows, self.power, self.J, np.zeros((points, 3)),
+            self.right, self.L, self.rows, self.power, self.J, self.drift, self.twist_rows,
+            self.spin,
         )  # fmt: skip

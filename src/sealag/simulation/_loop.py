@@ -1,8 +1,7 @@
 """The closed loop: plant, links and controller, each at its own rate."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,75 +10,14 @@ from sealag.delay import DelayLine
 from sealag.errors import InputError, SealagError
 from sealag.robot import Robot
 from sealag.simulation._audit import audit
-from sealag.simulation._ground import FlatGround, Foot, Ground
 from sealag.simulation._ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.simulation._plant import Plant
 from sealag.simulation._run import Log, Run
+from sealag.simulation._scene import Scene
 from sealag.typing import Array
 from sealag.whole_body import Measurement, StoringController, TickController
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Push:
-    """A constant force on the origin of a frame for some time.
-
-    Attributes:
-        frame: Where it acts.
-        force: Force in the world frame (3,), N.
-        start: When it begins, s; it begins and ends at the nearest physics steps.
-        duration: How long it lasts, s.
-
-    Raises:
-        InputError: The force is not three finite numbers, or the times are negative.
-    """
-
-    frame: str
-    force: tuple[float, float, float]
-    start: float
-    duration: float
-
-    def __post_init__(self) -> None:
-        if len(self.force) != 3 or not all(map(math.isfinite, self.force)):
-            raise InputError(f"push on {self.frame}: force must be 3 finite numbers (N)")
-        if not (self.start >= 0 and self.duration > 0 and math.isfinite(self.start)):
-            raise InputError(
-                f"push on {self.frame}: start must be >= 0 s and duration > 0 s, "
-                f"got {self.start} and {self.duration}"
-            )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FallLimits:
-    """When a floating-base robot counts as fallen.
-
-    Attributes:
-        height_fraction: Base height above the ground, as a fraction of its height at the start.
-        tilt: Angle between the base's z axis and its direction at the start, rad.
-    """
-
-    height_fraction: float = 0.5
-    tilt: float = 1.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
-    """What surrounds the robot.
-
-    Attributes:
-        feet: What may touch the ground.
-        ground: Where the ground is.
-        pushes: Disturbing forces.
-        fall: When the robot counts as fallen; None never.
-        stabilisation: Rate at which contacts return to where they closed, 1/s.
-    """
-
-    feet: Sequence[Foot] = ()
-    ground: Ground = field(default_factory=FlatGround)
-    pushes: Sequence[Push] = ()
-    fall: FallLimits | None = field(default_factory=FallLimits)
-    stabilisation: float = 50.0
 
 
 def closed_loop(
@@ -173,7 +111,7 @@ class _Loop:
         n, feet = robot.n, len(scene.feet)
         self._central_steps = clock.steps_of("central", clock.central)
         self._embedded_steps = clock.steps_of("embedded", clock.embedded)
-        allocate = dict(nq=robot.nq, nv=robot.nv, n=n, contacts=feet)
+        allocate = {"nq": robot.nq, "nv": robot.nv, "n": n, "contacts": feet}
         self.truth = Measurement.allocate(**allocate)
         self.received = Measurement.allocate(**allocate)
         self.command, self._passing, self.acting = (np.zeros(n + 1) for _ in range(3))
@@ -193,9 +131,7 @@ class _Loop:
             )
 
         central, embedded = clock.central, clock.embedded
-        self._up = line(
-            network.central_up, self.truth.data.size, central, central, streams[0]
-        )
+        self._up = line(network.central_up, self.truth.data.size, central, central, streams[0])
         self._down = line(network.central_down, n + 1, central, embedded, streams[1])
         self._drive = line(network.embedded_down, n + 1, embedded, embedded, streams[2])
         self._torque = None
@@ -203,9 +139,7 @@ class _Loop:
             self._torque = line(network.embedded_up, n, embedded, embedded, streams[3])
 
     # Start -------------------------------------------------------------------------------------
-    def prepare(
-        self, q: Array, v: Array, theta: Array | None, theta_dot: Array | None
-    ) -> None:
+    def prepare(self, q: Array, v: Array, theta: Array | None, theta_dot: Array | None) -> None:
         """Put the plant in its first state and fill the links with the first command."""
         n, truth = self.robot.n, self.truth
         stiffness = self.plant.actuators.spring_stiffness
@@ -355,12 +289,11 @@ class _Loop:
     def _allocate(self, rows: int) -> Log:
         robot, count = self.robot, self.plant.contacts.count
         n = robot.n
-        widths = dict(
-            time=1, q=robot.nq, v=robot.nv, theta=n, theta_dot=n, tau_sea=n, tau_motor=n,
-            tau_command=n, tau_osc=n, measurement_age=1, command_age=1, mode=count,
-            force=3 * count, stores=len(STORES), joint=len(JOINT_FLOWS) * n,
-            scalar=len(SCALAR_FLOWS), residual=1, throughput=1, storage=1,
-        )  # fmt: skip
+        joint = ("theta", "theta_dot", "tau_sea", "tau_motor", "tau_command", "tau_osc")
+        widths = {"time": 1, "q": robot.nq, "v": robot.nv, **dict.fromkeys(joint, n)}
+        widths |= {"measurement_age": 1, "command_age": 1, "mode": count, "force": 3 * count}
+        widths |= {"stores": len(STORES), "joint": len(JOINT_FLOWS) * n}
+        widths |= {"scalar": len(SCALAR_FLOWS), "residual": 1, "throughput": 1, "storage": 1}
         return Log(rows, widths)
 
     def _record(self, log: Log) -> None:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Self
+from typing import Self, overload
 
 from sealag.delay import Constant, Delays, DelaySignal, Link, PacketOrder
 from sealag.errors import InputError
@@ -31,7 +31,11 @@ class Share:
         """Mean of the fraction, s."""
         return self.fraction * self.signal.mean
 
-    def at(self, t: Array) -> Array:
+    @overload
+    def at(self, t: float) -> float: ...
+    @overload
+    def at(self, t: Array) -> Array: ...
+    def at(self, t: float | Array) -> float | Array:
         """Return the fraction of the delay at ``t`` (s)."""
         return self.fraction * self.signal.at(t)
 
@@ -59,7 +63,7 @@ class Network:
     @classmethod
     def ideal(cls) -> Self:
         """Return a network without delay."""
-        link = Link(delay=Constant(0.0))
+        link = Link(delay=Constant(value=0.0))
         return cls(central_up=link, central_down=link, embedded_down=link)
 
     @classmethod
@@ -72,26 +76,32 @@ class Network:
         max_burst: int = 10,
         order: PacketOrder = PacketOrder.FIFO,
     ) -> Self:
-        """Share T_H between both central links and give half of T_L to the way down.
+        """Share T_H between the central links and give half of T_L to the way down.
 
-        The total is d_1 = T_H + T_L / 2 besides sampling.
+        The total is d_1 = T_H + T_L / 2 besides sampling, however T_H is shared.
 
         Args:
-            delays: The round trips.
+            delays: The round trips; ``up_share`` is the part of T_H on the way to the motors.
             jitter: Random delay of each central packet, uniform in [0, jitter], s.
             loss: Probability that a central packet is lost.
             max_burst: Largest number of central packets lost in a row.
             order: What central packets that overtake each other do.
         """
-        half = Link(
-            delay=Share(signal=delays.central, fraction=0.5),
-            jitter=jitter,
-            loss=loss,
-            max_burst=max_burst,
-            order=order,
+
+        def central(fraction: float) -> Link:
+            return Link(
+                delay=Share(signal=delays.central, fraction=fraction),
+                jitter=jitter,
+                loss=loss,
+                max_burst=max_burst,
+                order=order,
+            )
+
+        return cls(
+            central_up=central(1.0 - delays.up_share),
+            central_down=central(delays.up_share),
+            embedded_down=Link(delay=Share(signal=delays.embedded, fraction=0.5)),
         )
-        down = Link(delay=Share(signal=delays.embedded, fraction=0.5))
-        return cls(central_up=half, central_down=half, embedded_down=down)
 
     def delay_bound(self, clock: "Clock") -> float:
         """Return an upper bound of the total delay d_1 of the position feedback, s.

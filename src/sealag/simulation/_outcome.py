@@ -29,7 +29,7 @@ class EventKind(StrEnum):
     LIFT_OFF = "lift_off"
 
 
-class PlantStop(Exception):  # noqa: N818 - not an error: the plant's way out of a step
+class PlantStop(Exception):
     """Ends a step that cannot be completed; carries the outcome and a sentence."""
 
     def __init__(self, outcome: Outcome, message: str) -> None:

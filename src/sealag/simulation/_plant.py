@@ -6,6 +6,7 @@ and end it there, so that the order survives them. First order: sliding friction
 kernels.contact), torque and velocity limits and Coulomb stick, which act from a step's beginning.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -105,7 +106,8 @@ class Plant:
         )
         motor.tables(self._parameters, self._instant, step, *self._tables)
         self._now, self._next, self._stage = (
-            Instant(robot, self.contacts.total, count) for _ in range(3)
+            Instant(robot, points=self.contacts.total, contacts=count, feet=len(feet))
+            for _ in range(3)
         )
         self._rates, self._accelerations = np.zeros((4, nv)), np.zeros((4, nv))
         self._powers = np.zeros((4, 5))
@@ -204,6 +206,7 @@ class Plant:
         measured = self._now.tau if tau_measured is None else tau_measured
         left, regular = self.step_length, True
         for _ in range(_EVENTS_PER_STEP):
+            self.contacts.remember()
             self._try(left, regular, tau_osc, measured)
             margin, point = self.contacts.margin(self._next)
             if margin >= -MARGIN:
@@ -253,6 +256,10 @@ class Plant:
             self._tables[2], regular, self._work,
         )  # fmt: skip
         self._evaluate(nxt)
+        if not math.isfinite(nxt.power[4]):
+            raise PlantStop(
+                Outcome.DIVERGED, f"velocities are not finite after t = {self.time:.4f} s"
+            )
         self.contacts.measure_gaps(nxt)
 
     def _evaluate(self, at: Instant, motor: Array | None = None) -> None:
@@ -284,7 +291,10 @@ class Plant:
         f_low = max(self.contacts.margin(self._now)[0], MARGIN)
         side = 0
         for _ in range(_LOCATE):
-            middle = (low * f_high - high * f_low) / (f_high - f_low)
+            middle = 0.5 * (low + high)
+            if math.isfinite(f_low):  # else the gap widens there: halve
+                middle = (low * f_high - high * f_low) / (f_high - f_low)
+            self.contacts.recall()
             self._try(middle, False, tau_osc, measured)
             value, at = self.contacts.margin(self._next)
             point = at if value < MARGIN else point
@@ -331,7 +341,7 @@ class Plant:
         self._evaluate(now)
         self.ledger.strike(-float((mean * impulse).sum()), now)
 
-    def _report(self, before: Array) -> None:
+    def _report(self, before: IntArray) -> None:
         after = self.contacts.closed
         for point in np.flatnonzero(before != after):
             hit = bool(after[point])

@@ -1,0 +1,69 @@
+"""What surrounds the robot in a run: feet and ground, pushes, and when it has fallen."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from sealag.errors import InputError
+from sealag.simulation._ground import FlatGround, Foot, Ground
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Push:
+    """A constant force on the origin of a frame for some time.
+
+    Attributes:
+        frame: Where it acts.
+        force: Force in the world frame (3,), N.
+        start: When it begins, s; it begins and ends at the nearest physics steps.
+        duration: How long it lasts, s.
+
+    Raises:
+        InputError: The force is not three finite numbers, or the times are negative.
+    """
+
+    frame: str
+    force: tuple[float, float, float]
+    start: float
+    duration: float
+
+    def __post_init__(self) -> None:
+        if len(self.force) != 3 or not all(map(math.isfinite, self.force)):
+            raise InputError(f"push on {self.frame}: force must be 3 finite numbers (N)")
+        if not (self.start >= 0 and self.duration > 0 and math.isfinite(self.start)):
+            raise InputError(
+                f"push on {self.frame}: start must be >= 0 s and duration > 0 s, "
+                f"got {self.start} and {self.duration}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FallLimits:
+    """When a floating-base robot counts as fallen.
+
+    Attributes:
+        height_fraction: Base height above the ground, as a fraction of its height at the start.
+        tilt: Angle between the base's z axis and its direction at the start, rad.
+    """
+
+    height_fraction: float = 0.5
+    tilt: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """What surrounds the robot.
+
+    Attributes:
+        feet: What may touch the ground.
+        ground: Where the ground is.
+        pushes: Disturbing forces.
+        fall: When the robot counts as fallen; None never.
+        stabilisation: Rate at which contacts return to where they closed, 1/s.
+    """
+
+    feet: Sequence[Foot] = ()
+    ground: Ground = field(default_factory=FlatGround)
+    pushes: Sequence[Push] = ()
+    fall: FallLimits | None = field(default_factory=FallLimits)
+    stabilisation: float = 50.0
