@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol, overload
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -24,11 +24,7 @@ class DelaySignal(Protocol):
         """Return the mean delay, s."""
         ...
 
-    @overload
-    def at(self, t: float) -> float: ...
-    @overload
-    def at(self, t: Array) -> Array: ...
-    def at(self, t: float | Array) -> float | Array:
+    def at(self, t: float | Array) -> Any:
         """Return the delay of what is sent at an instant.
 
         Args:
