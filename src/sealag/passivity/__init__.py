@@ -6,5 +6,13 @@ from sealag.passivity._bounds import (
     max_delay,
     max_delay_from_stiffness,
 )
+from sealag.passivity._multitask import MultitaskBound, max_delay_multitask
 
-__all__ = ["DelayBound", "limiting_direction", "max_delay", "max_delay_from_stiffness"]
+__all__ = [
+    "DelayBound",
+    "MultitaskBound",
+    "limiting_direction",
+    "max_delay",
+    "max_delay_from_stiffness",
+    "max_delay_multitask",
+]

@@ -65,9 +65,9 @@ def max_delay(
         InputError: a shape does not fit, an entry is not finite, D_θ is not positive definite,
             or Λ or K_x is not symmetric positive semidefinite.
     """
-    J, inertia, gain, form = _checked_task(J_star, Lambda, K_x, form=form)
+    J, inertia, gain, form = checked_task(J_star, Lambda, K_x, form=form)
     scaled, root_error = _scaled_jacobian(J, D_theta)
-    S, S_error = _stiffness(inertia, gain, form=form)
+    S, S_error = task_stiffness(inertia, gain, form=form)
     A = np.swapaxes(scaled, -1, -2) @ S @ scaled
     size2 = np.sum(scaled**2, axis=(-2, -1))
     m, n = J.shape[-2:]
@@ -172,7 +172,7 @@ def inverse_root(D_theta: ArrayLike, n: int) -> tuple[Array, Array]:
     return np.linalg.inv(factor), 8.0 * n * EPS * values[..., -1] / values[..., 0]
 
 
-def _checked_task(
+def checked_task(
     J_star: ArrayLike, Lambda: ArrayLike, K_x: ArrayLike, *, form: StiffnessForm | str
 ) -> tuple[Array, Array, Array, StiffnessForm]:
     try:
@@ -217,7 +217,7 @@ def _scaled_jacobian(J: Array, D_theta: ArrayLike) -> tuple[Array, Array]:
     return J @ np.swapaxes(root, -1, -2), error
 
 
-def _stiffness(inertia: Array, gain: Array, *, form: StiffnessForm) -> tuple[Array, Array]:
+def task_stiffness(inertia: Array, gain: Array, *, form: StiffnessForm) -> tuple[Array, Array]:
     """S of a form, and a norm-wise bound of its rounding error."""
     m = gain.shape[-1]
     norm_K = np.linalg.norm(gain, axis=(-2, -1))
