@@ -6,13 +6,31 @@ from sealag.passivity._bounds import (
     max_delay,
     max_delay_from_stiffness,
 )
+from sealag.passivity._certificate import (
+    Certificate,
+    Criterion,
+    Proof,
+    Status,
+    Worst,
+    read_certificate,
+    write_certificate,
+)
+from sealag.passivity._multipliers import joint_multiplier
 from sealag.passivity._multitask import MultitaskBound, max_delay_multitask
 
 __all__ = [
+    "Certificate",
+    "Criterion",
     "DelayBound",
     "MultitaskBound",
+    "Proof",
+    "Status",
+    "Worst",
+    "joint_multiplier",
     "limiting_direction",
     "max_delay",
     "max_delay_from_stiffness",
     "max_delay_multitask",
+    "read_certificate",
+    "write_certificate",
 ]
