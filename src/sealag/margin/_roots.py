@@ -1,90 +1,116 @@
-"""Rightmost characteristic roots by Chebyshev pseudospectral discretisation."""
+"""Rightmost characteristic roots, by Chebyshev collocation and Newton's method."""
+
+import math
 
 import numpy as np
 
 from sealag.errors import InputError
+from sealag.margin._loop import Loop, prepare
 from sealag.typing import Array, ArrayLike
+
+_MOST_NODES = 120
 
 
 def rightmost_roots(
-    A_0: ArrayLike, A_1: ArrayLike, delay: float, *, nodes: int | None = None
+    A_0: ArrayLike,
+    A_1: ArrayLike,
+    *,
+    delay: float,
+    count: int = 1,
+    nodes: int = 24,
+    symmetries: ArrayLike | None = None,
 ) -> Array:
-    """Compute the rightmost roots of det(sI − A_0 − A_1 e^{−sd}) = 0.
+    """Rightmost roots of det(λ − A_0 − A_1 e^{-λd}) = 0.
 
-    The infinitesimal generator on [−d, 0] is collocated at Chebyshev points (Breda, Maset,
-    Vermiglio, SIAM J. Sci. Comput. 2005); each root is then corrected by Newton's method on the
-    characteristic equation. Roots that Newton moves far are artefacts and are left out.
+    The generator of the solution semigroup is discretised on Chebyshev nodes over [−d, 0]
+    (Breda, Maset & Vermiglio) and every root refined by Newton's method on the characteristic
+    equation. Independent of `delay_margin`; a heuristic where `nodes` resolve too little.
 
     Args:
-        A_0: (N, N) what acts without delay.
-        A_1: (N, N) what acts with delay.
-        delay: d, s.
-        nodes: degree of the polynomials; chosen from the norms and the delay if None.
+        A_0: (n, n) undelayed part, 1/s.
+        A_1: (n, n) delayed part, 1/s.
+        delay: d, s, constant.
+        count: how many roots.
+        nodes: Chebyshev nodes over the delay; doubled until the roots stand still.
+        symmetries: (n, s) neutral directions to leave out, as in `delay_margin`.
 
     Returns:
-        (k,) complex roots by falling real part.
+        (count,) complex roots by decreasing real part; fewer if the loop has fewer.
 
     Raises:
-        InputError: the delay is negative or not finite.
+        InputError: a matrix cannot be used, or the delay is negative or not finite.
     """
-    first, second = np.asarray(A_0, dtype=float), np.asarray(A_1, dtype=float)
-    if not (np.isfinite(delay) and delay >= 0.0):
-        raise InputError(f"The delay is {delay}; a finite, not negative time in s is needed.")
-    if delay == 0.0:
-        roots = np.linalg.eigvals(first + second)
-        return roots[np.argsort(-roots.real)]
-    size = len(first)
-    if nodes is None:
-        speed = float(np.abs(np.linalg.eigvals(first)).max(initial=1.0))
-        nodes = int(np.clip(12 + 0.6 * speed * delay, 12, max(14, 700 // size)))
-    generator = np.zeros((size * (nodes + 1), size * (nodes + 1)))
-    D = _differentiation(nodes) * 2.0 / delay
-    generator[size:] = np.kron(D[1:], np.eye(size))
-    generator[:size, :size] = first
-    generator[:size, -size:] = second
-    found = np.linalg.eigvals(generator)
-    found = found[np.argsort(-found.real)][: max(4 * size, 20)]
-    refined = [_newton(first, second, root, delay=delay) for root in found]
-    good = np.array([root for root in refined if root is not None], dtype=complex)
-    return good[np.argsort(-good.real)]
+    if not (math.isfinite(delay) and delay >= 0.0):
+        raise InputError(f"delay is {delay} s; a finite time of at least zero is needed.")
+    if count < 1 or nodes < 4:
+        raise InputError(f"count is {count} and nodes {nodes}; at least 1 and 4 are needed.")
+    return loop_roots(prepare(A_0, A_1, symmetries=symmetries), delay, count=count, nodes=nodes)
 
 
-def _differentiation(degree: int) -> Array:
-    """Chebyshev differentiation matrix on points that fall from 1 to −1."""
-    k = np.arange(degree + 1)
-    x = np.cos(np.pi * k / degree)
-    c = np.where((k == 0) | (k == degree), 2.0, 1.0) * (-1.0) ** k
-    gap = x[:, None] - x[None, :]
-    D = np.outer(c, 1.0 / c) / (gap + np.eye(degree + 1))
+def loop_roots(loop: Loop, delay: float, *, count: int, nodes: int = 24) -> Array:
+    """Rightmost roots of a prepared loop.
+
+    Args:
+        loop: the loop.
+        delay: d, s.
+        count: how many.
+        nodes: Chebyshev nodes to begin with.
+
+    Returns:
+        (count,) roots by decreasing real part.
+    """
+    if delay == 0.0 or not loop.B.size:
+        values = np.linalg.eigvals(loop.A_0 + loop.A_1)
+        return values[np.argsort(-values.real)][:count]
+    previous = _collocated(loop, delay, count=count, nodes=nodes)
+    while nodes < _MOST_NODES:
+        nodes = 3 * nodes // 2
+        roots = _collocated(loop, delay, count=count, nodes=nodes)
+        moved = np.abs(roots.real - previous.real).max()
+        if moved <= 1e-8 * max(1.0 / delay, float(np.abs(roots).max())):
+            break
+        previous = roots
+    return roots
+
+
+def _collocated(loop: Loop, delay: float, *, count: int, nodes: int) -> Array:
+    n = len(loop.A_0)
+    D = 2.0 / delay * _differentiation(nodes)
+    generator = np.kron(D, np.eye(n))
+    generator[:n] = 0.0
+    generator[:n, :n] = loop.A_0
+    generator[:n, -n:] += loop.A_1
+    values = np.linalg.eigvals(generator)
+    values = values[np.argsort(-values.real)][: 2 * count + 4]
+    refined = np.array([_newton(loop, delay, value) for value in values])
+    order = np.argsort(-refined.real, kind="stable")
+    return refined[order][:count]
+
+
+def _differentiation(N: int) -> Array:
+    """(N+1, N+1) Chebyshev differentiation on cos(kπ/N): the first node is the present."""
+    x = np.cos(np.pi * np.arange(N + 1) / N)
+    weight = np.where((np.arange(N + 1) == 0) | (np.arange(N + 1) == N), 2.0, 1.0)
+    weight = weight * (-1.0) ** np.arange(N + 1)
+    D = np.outer(weight, 1.0 / weight) / (x[:, None] - x[None, :] + np.eye(N + 1))
     return D - np.diag(D.sum(axis=1))
 
 
-def _newton(A_0: Array, A_1: Array, root: complex, *, delay: float) -> complex | None:
-    """Correct one root with its eigenvector; None if it does not settle where it began."""
-    size, start = len(A_0), root
-    scale = np.linalg.norm(A_0) + np.linalg.norm(A_1)
-    matrix = _characteristic(A_0, A_1, root, delay=delay)
-    vector = np.linalg.svd(matrix)[2][-1].conj()
-    border = vector.conj()
+def _newton(loop: Loop, delay: float, root: complex) -> complex:
+    """Newton on the smallest singular direction; a step that leaves the neighbourhood is refused."""
+    start = root
     for _ in range(12):
-        matrix = _characteristic(A_0, A_1, root, delay=delay)
-        slope = np.eye(size) + delay * np.exp(-root * delay) * A_1
-        system = np.block(
-            [[matrix, (slope @ vector)[:, None]], [border[None, :], np.zeros((1, 1))]]
-        )
-        right = -np.concatenate([matrix @ vector, [border @ vector - 1.0]])
-        try:
-            step = np.linalg.solve(system, right)
-        except np.linalg.LinAlgError:
+        late = np.exp(-root * delay) * loop.A_1
+        P = root * np.eye(len(loop.A_0)) - loop.A_0 - late
+        U, values, V = np.linalg.svd(P)
+        left, right = U[:, -1].conj(), V[-1].conj()
+        slope = left @ right + delay * (left @ late @ right)
+        if slope == 0.0:
             break
-        vector, root = vector + step[:-1], root + step[-1]
-        if not np.isfinite(root) or abs(root - start) > 0.2 * (abs(start) + 1.0 / delay):
-            return None
-        if abs(step[-1]) <= 1e-12 * (abs(root) + 1e-6 * scale):
-            return root
-    residual = np.linalg.norm(_characteristic(A_0, A_1, root, delay=delay) @ vector)
-    return root if residual <= 1e-8 * scale * np.linalg.norm(vector) else None
-
-
-def _characteristic(A_0: Array, A_1: Array, root: complex, *, delay: float) -> Array:
-    return root * np.eye(len(A_0)) - A_0 - np.exp(-root * delay) * A_1
+        step = values[-1] / slope
+        root = root - step
+        if abs(root - start) > 0.1 * max(abs(start), 1.0 / delay):
+            return start
+        if abs(step) <= 1e-14 * max(abs(root), 1e-300):
+            break
+    return root

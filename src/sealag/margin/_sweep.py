@@ -1,0 +1,191 @@
+"""All frequencies at which a delay can put a root on the imaginary axis, with a proof for the rest.
+
+An interval of frequencies is excluded when every disc that must hold an eigenvalue of
+G(ω), for all ω in it, misses the line Re(z_0 ν) = −½. Two enclosures are used: Gershgorin's after
+the eigenvectors at the centre, and Henrici's from the departure from normality, which needs no
+eigenvectors. What is left is bisected until it is a point.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.errors import SolverError
+from sealag.margin._loop import Transfer
+from sealag.typing import Array, BoolArray
+
+_NARROW = 2e-9
+_FLOOR = 1e-7
+_WORST_VECTORS = 1e10
+_MOST_INTERVALS = 400_000
+_CHUNK = 4096
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cluster:
+    """A band of frequencies too narrow to split that may hold a crossing.
+
+    Attributes:
+        lower: lower end, rad/s.
+        upper: upper end, rad/s.
+    """
+
+    lower: float
+    upper: float
+
+
+def candidate_bands(transfer: Transfer) -> list[Cluster]:
+    """Find the narrow bands outside which no delay puts a root on the imaginary axis.
+
+    Args:
+        transfer: G about its reference.
+
+    Returns:
+        Disjoint bands in increasing frequency; the first may touch zero.
+
+    Raises:
+        SolverError: more intervals than any sensible loop needs.
+    """
+    top = 1.01 * transfer.loop.size
+    marks = np.abs(transfer.poles.imag)
+    edges = np.unique(
+        np.concatenate([[0.0, top], np.geomspace(_FLOOR * top, top, 80), marks[marks < top]])
+    )
+    lower, upper = edges[:-1], edges[1:]
+    narrow: list[tuple[float, float]] = []
+    count = 0
+    while len(lower):
+        count += len(lower)
+        if count > _MOST_INTERVALS:
+            raise SolverError(
+                "The frequency sweep does not close: the loop is too close to losing stability "
+                "over a whole band of frequencies, or its matrices are badly scaled."
+            )
+        open_ = np.concatenate(
+            [
+                ~excluded(transfer, lower[i : i + _CHUNK], upper[i : i + _CHUNK])
+                for i in range(0, len(lower), _CHUNK)
+            ]
+        )
+        lower, upper = lower[open_], upper[open_]
+        final = upper - lower <= _NARROW * np.maximum(upper, _FLOOR * top)
+        narrow += list(zip(lower[final], upper[final], strict=True))
+        lower, upper = lower[~final], upper[~final]
+        middle = (lower + upper) / 2.0
+        lower, upper = np.concatenate([lower, middle]), np.concatenate([middle, upper])
+    return _merged(sorted(narrow))
+
+
+def _merged(bands: list[tuple[float, float]]) -> list[Cluster]:
+    merged: list[Cluster] = []
+    for lower, upper in bands:
+        if merged and lower <= merged[-1].upper * (1.0 + 1e-15):
+            merged[-1] = Cluster(lower=merged[-1].lower, upper=upper)
+        else:
+            merged.append(Cluster(lower=lower, upper=upper))
+    return merged
+
+
+def excluded(transfer: Transfer, lower: Array, upper: Array) -> BoolArray:
+    """Tell which intervals surely hold no crossing.
+
+    Args:
+        transfer: G about its reference.
+        lower: (N,) lower ends, rad/s.
+        upper: (N,) upper ends, rad/s.
+
+    Returns:
+        (N,) True where every eigenvalue stays off the line throughout the interval.
+    """
+    centre, half = (lower + upper) / 2.0, (upper - lower) / 2.0
+    with np.errstate(all="ignore"):
+        if transfer.left is not None and transfer.right is not None:
+            change = _modal(transfer, centre, half)
+        else:
+            change = _resolvent(transfer, centre, half)
+        nu, X = np.linalg.eig(transfer.reference * change.G)
+        gap = np.abs(nu.real + 0.5)
+        return _gershgorin(X, change, gap=gap) | _henrici(nu, change, gap=gap.min(axis=1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Change:
+    """G at the centres of N intervals and a bound of how far it moves inside them.
+
+    |G(ω) − G|, seen through any basis, is at most |left| · diag(weight) · |right|, entry by entry.
+    """
+
+    G: Array
+    left: Array
+    weight: Array
+    right: Array
+    full: bool
+    rounding: Array
+
+    def seen(self, X: Array, inverse: Array) -> Array:
+        """Return (N, r, r) entry-wise bounds of X⁻¹ (G(ω) − G) X."""
+        rows, columns = np.abs(inverse @ self.left), np.abs(self.right @ X)
+        if self.full:
+            rows = np.linalg.norm(rows, axis=2, keepdims=True)
+            columns = np.linalg.norm(columns, axis=1, keepdims=True)
+        return (rows * self.weight[:, None, :]) @ columns
+
+    def norm(self) -> Array:
+        """Return (N,) bounds of ‖G(ω) − G‖ with the rounding of G."""
+        rank = self.G.shape[-1]
+        unit = np.broadcast_to(np.eye(rank), self.G.shape)
+        return np.linalg.norm(self.seen(unit, unit), axis=(1, 2)) + self.rounding
+
+
+def _modal(transfer: Transfer, centre: Array, half: Array) -> _Change:
+    """Each pole's term changes by half / (distance at the centre · nearest distance)."""
+    assert transfer.left is not None and transfer.right is not None
+    away = 1j * centre[:, None] - transfer.poles
+    sideways = np.maximum(np.abs(away.imag) - half[:, None], 0.0)
+    nearest = np.hypot(sideways, transfer.poles.real)
+    terms = np.linalg.norm(transfer.left, axis=0) * np.linalg.norm(transfer.right, axis=1)
+    return _Change(
+        G=(transfer.left[None] / away[:, None, :]) @ transfer.right,
+        left=transfer.left[None],
+        weight=half[:, None] / (np.abs(away) * nearest),
+        right=transfer.right[None],
+        full=False,
+        rounding=transfer.rounding * (terms / np.abs(away)).sum(axis=1),
+    )
+
+
+def _resolvent(transfer: Transfer, centre: Array, half: Array) -> _Change:
+    """Without eigenvectors: R(ω) − R = −j(ω−c) R (I + j(ω−c) R)⁻¹ R."""
+    R = transfer.resolvents(centre)
+    size = np.linalg.norm(R, ord=2, axis=(1, 2))
+    reach = 1.0 - half * size
+    left, right = transfer.loop.C @ R, R @ transfer.loop.B
+    error = np.linalg.norm(left, axis=(1, 2)) * np.linalg.norm(right, axis=(1, 2))
+    return _Change(
+        G=left @ transfer.loop.B,
+        left=left,
+        weight=np.where(reach > 0.0, half / np.where(reach > 0.0, reach, 1.0), np.inf)[:, None],
+        right=right,
+        full=True,
+        rounding=transfer.rounding * transfer.loop.size * error,
+    )
+
+
+def _gershgorin(X: Array, change: _Change, *, gap: Array) -> BoolArray:
+    """Discs about the eigenvalues at the centre, in their eigenvectors' basis."""
+    condition = np.linalg.cond(X)
+    usable = condition < _WORST_VECTORS
+    safe = np.where(usable[:, None, None], X, np.eye(X.shape[-1]))
+    bound = change.seen(safe, np.linalg.inv(safe))
+    error = (change.rounding * condition)[:, None]
+    by_rows = (bound.sum(axis=2) + error < gap).all(axis=1)
+    by_columns = (bound.sum(axis=1) + error < gap).all(axis=1)
+    return (by_rows | by_columns) & usable
+
+
+def _henrici(nu: Array, change: _Change, *, gap: Array) -> BoolArray:
+    """‖(s − G)⁻¹‖ ≤ Σ_k departure^k / gap^(k+1) < 1/‖change‖ for every s on the line."""
+    norm2 = np.linalg.norm(change.G, axis=(1, 2)) ** 2
+    departure = np.sqrt(np.maximum(norm2 - (np.abs(nu) ** 2).sum(axis=1), 0.0) + 1e-12 * norm2)
+    growth = sum((departure / gap) ** k for k in range(nu.shape[1]))
+    return np.nan_to_num(change.norm() * growth / gap, nan=np.inf) < 1.0
