@@ -1,0 +1,192 @@
+"""The first law on Hume, with nothing lost and with everything on; and the passivity observer."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from helpers.chains import wheel
+from helpers.controllers import Constant as ConstantTorque
+from helpers.controllers import JointPD, StoringPD
+from sealag.actuation import actuators
+from sealag.delay import Constant, Link, PacketOrder, Sinusoid
+from sealag.robot import Contact, load_robot
+from sealag.simulation import (
+    Clock,
+    FlatGround,
+    Foot,
+    Network,
+    Outcome,
+    Push,
+    Scene,
+    closed_loop,
+)
+
+FEET = ("left_foot", "right_foot")
+ROTOR = np.array([0.1357, 0.093, 0.093] * 2)
+
+
+@pytest.fixture(scope="module")
+def hume():
+    return load_robot("bundled:hume.urdf", floating_base=True)
+
+
+def _standing(robot, clearance=0.0):
+    q = robot.configuration(np.deg2rad([0, -25, 55, 0, -25, 55]))
+    low = min(robot.frame_placement(foot, q)[1][2] for foot in FEET)
+    q[2] += clearance - low
+    return q
+
+
+def _everything(robot):
+    springs = actuators(
+        robot.joints,
+        spring_stiffness=1000.0,
+        rotor_inertia=ROTOR,
+        inertia_shaping=0.5,
+        motor_damping=np.array([3.0, 20.0, 20.0] * 2),
+        spring_damping=0.5,
+        coulomb_friction=0.4,
+        viscous_friction=0.3,
+        torque_limit=60.0,
+        velocity_limit=20.0,
+        torque_bandwidth=1500.0,
+    )
+    link = Link(delay=Sinusoid(mean=4e-3, amplitude=2e-3, angular_frequency=3.0), jitter=2e-3)
+    lossy = dataclasses.replace(link, loss=0.1, order=PacketOrder.NEWEST)
+    short = Link(delay=Constant(value=1e-3))
+    network = Network(central_up=link, central_down=lossy, embedded_down=short, embedded_up=short)
+    feet = [
+        Foot(
+            contact=Contact(frame=foot),
+            friction=0.4,
+            torsional_damping=3.0,
+            torsional_radius=0.01,
+        )
+        for foot in FEET
+    ]
+    pushes = [Push(frame="torso", force=(60.0, 20.0, 0.0), start=0.15, duration=0.1)]
+    return springs, network, Scene(feet=feet, ground=FlatGround(level=0.1), pushes=pushes)
+
+
+def test_nothing_lost_on_a_held_foot(hume):
+    """No damping, friction, impact or delay: 1e-6 of the throughput, at fourth order."""
+    springs = actuators(
+        hume.joints, spring_stiffness=1000.0, rotor_inertia=ROTOR, motor_damping=1e-12
+    )
+    q = _standing(hume)
+    scene = Scene(feet=[Foot(contact=Contact(frame=FEET[0]), friction=np.inf)])
+    closures = []
+    for step in (2e-3, 1e-3):
+        run = closed_loop(
+            hume,
+            springs,
+            JointPD(q[-6:], stiffness=200.0, offset=5.0),
+            q=q,
+            theta=q[-6:],
+            duration=0.3,
+            clock=Clock(physics=step, central=2e-3),
+            scene=scene,
+        )
+        assert run.outcome is Outcome.COMPLETED
+        closures.append(run.audit.closure)
+    assert closures[1] < 1e-7
+    assert closures[0] / closures[1] > 8
+    assert run.audit.throughput[-1] > 10
+    for name in ("viscous", "coulomb", "spring_damping", "damping"):
+        assert np.abs(run.audit.joint_flows[name]).max() < 1e-9
+
+
+def test_everything_on_closes(hume):
+    springs, network, scene = _everything(hume)
+    q = _standing(hume, clearance=0.11)
+    run = closed_loop(
+        hume,
+        springs,
+        JointPD(q[-6:], stiffness=300.0, damping=2.0),
+        q=q,
+        duration=0.5,
+        clock=Clock(physics=5e-4, embedded=1e-3, central=2e-3),
+        network=network,
+        scene=scene,
+        seed=3,
+    )
+    assert run.outcome is Outcome.COMPLETED
+    assert run.audit.closure < 1e-4
+    works = run.audit.scalar_flows | {k: v.sum(axis=1) for k, v in run.audit.joint_flows.items()}
+    for name in ("damping", "viscous", "coulomb", "spring_damping", "impact"):
+        assert works[name][-1] > 1e-3, name
+        assert np.diff(works[name]).min() > -1e-12, name  # lost for good
+    assert works["sliding"][-1] < -1e-6
+    assert works["torsion"][-1] < -1e-6
+    assert works["disturbance"][-1] > 1e-2
+    # the books would not close without each of them
+    for name in ("viscous", "coulomb", "spring_damping", "impact", "disturbance"):
+        assert abs(works[name][-1]) > 5 * np.abs(run.audit.residual).max(), name
+
+
+def test_motor_books_balance_by_themselves(hume):
+    """Δ½ θ̇ᵀB θ̇ = motor work - shaft work - friction, all five from separate integrals."""
+    springs, network, scene = _everything(hume)
+    q = _standing(hume, clearance=0.1)
+    run = closed_loop(
+        hume,
+        springs,
+        JointPD(q[-6:], stiffness=300.0, damping=2.0),
+        q=q,
+        duration=0.2,
+        network=network,
+        scene=scene,
+    )
+    flows = {name: work.sum(axis=1) for name, work in run.audit.joint_flows.items()}
+    motor = run.audit.stores["motor"]
+    work = flows["motor_work"] - flows["shaft"] - flows["viscous"] - flows["coulomb"]
+    np.testing.assert_allclose(motor - motor[0], work, atol=1e-9)
+    spring = run.audit.stores["spring"]
+    work = flows["shaft"] - flows["port"] - flows["spring_damping"]
+    np.testing.assert_allclose(spring - spring[0], work, atol=1e-9)
+
+
+class TestPassivityObserver:
+    """One joint, motor-angle feedback: delay below and above the bound 0.1 s of Eq. (29)."""
+
+    def _run(self, folder, delay, duration=1.0):
+        robot = wheel(folder, inertia=1.0)
+        springs = actuators(
+            robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=10.0
+        )
+        none = Link(delay=Constant(value=0.0))
+        late = Link(delay=Constant(value=delay))
+        return closed_loop(
+            robot,
+            springs,
+            StoringPD(np.zeros(1), stiffness=100.0, motor=True),
+            q=np.array([0.3]),
+            theta=np.array([0.3]),
+            duration=duration,
+            network=Network(central_up=none, central_down=late, embedded_down=none),
+        )
+
+    def test_passive_below(self, tmp_path):
+        audit = self._run(tmp_path, 0.06).audit
+        assert audit.joint_side.passive
+        assert audit.controller_side is not None
+        assert audit.controller_side.passive
+        assert audit.controller_side.first_violation is None
+
+    def test_not_passive_far_above(self, tmp_path):
+        run = self._run(tmp_path, 0.3, duration=3.0)
+        side = run.audit.controller_side
+        assert side is not None
+        assert not side.passive
+        assert side.joint == "joint0"
+        assert 0.1 < side.first_violation < 3.0
+        assert run.audit.joint_side.passive  # springs and motors are, whatever drives them
+
+    def test_no_statement_without_storage(self, tmp_path):
+        robot = wheel(tmp_path)
+        springs = actuators(
+            robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=10.0
+        )
+        run = closed_loop(robot, springs, ConstantTorque([1.0]), q=np.zeros(1), duration=0.05)
+        assert run.audit.controller_side is None
