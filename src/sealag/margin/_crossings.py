@@ -12,6 +12,8 @@ from sealag.typing import Array
 _ON_LINE = 1e-5
 _SLOW = 1e-6
 _STEPS = 30
+_ENDLESS = 1e6
+_REACH = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,15 +54,28 @@ def crossings_in(transfer: Transfer, bands: list[Cluster]) -> tuple[list[Crossin
     found: list[Crossing] = []
     explained = True
     for band in bands:
-        if band.lower <= 0.0:
-            continue
         middle = (band.lower + band.upper) / 2.0
         nu = np.linalg.eigvals(transfer.reference * transfer.near(middle)[0])
         starts = nu[_near_line(nu, _ON_LINE)]
-        here = [_refine(transfer, middle, nu=value) for value in starts]
-        found += [crossing for crossing in here if crossing is not None]
-        explained &= bool(here) and None not in here
+        here = [_refine(transfer, middle, nu=value) for value in starts] if band.lower else []
+        refined = [crossing for crossing in here if crossing is not None]
+        found += [crossing for crossing in refined if not _static(transfer, crossing)]
+        explained &= (bool(here) and len(refined) == len(here)) or _endless(transfer, band)
     return sorted(found, key=lambda crossing: crossing.delay), explained
+
+
+def _static(transfer: Transfer, crossing: Crossing) -> bool:
+    """Whether a crossing is a contact at zero frequency, which no finite delay reaches."""
+    longest = crossing.delay * transfer.loop.size
+    return longest > (_ENDLESS if crossing.direction == 0 else 100.0 * _ENDLESS)
+
+
+def _endless(transfer: Transfer, band: Cluster) -> bool:
+    """Whether a band that reaches down to zero frequency can only mean extremely long delays."""
+    nu = np.linalg.eigvals(transfer.reference * transfer.near(band.upper)[0])
+    z = transfer.reference * (1.0 + 1.0 / nu[_near_line(nu, 1e-2)])
+    angle = np.abs(np.angle(z)).min(initial=math.pi)
+    return bool(angle / band.upper > _ENDLESS / transfer.loop.size)
 
 
 def _near_line(nu: Array, tolerance: float) -> Array:
@@ -69,7 +84,7 @@ def _near_line(nu: Array, tolerance: float) -> Array:
 
 
 def _refine(transfer: Transfer, omega: float, *, nu: complex) -> Crossing | None:
-    """Newton's method on Re(z_0 ν(ω)) = −½; a touching root stops where it is nearest."""
+    """Newton's method on Re(z_0 ν(ω)) = −½; where the root only touches, on its slope."""
     start, best = omega, (math.inf, omega, nu, 0j)
     for _ in range(_STEPS):
         value, slope = _track(transfer, omega, nu=nu)
@@ -79,14 +94,44 @@ def _refine(transfer: Transfer, omega: float, *, nu: complex) -> Crossing | None
         rate = (1j * slope).real
         if abs(miss) < 4e-16 * abs(value) or rate == 0.0:
             break
-        step = float(np.clip(miss / rate, -1e-4 * start, 1e-4 * start))
+        step = float(np.clip(miss / rate, -_REACH * start, _REACH * start))
         if omega - step == omega:
             break
         omega, nu = omega - step, value - 1j * slope * step
     _, omega, value, slope = best
-    if abs(omega - start) > 1e-4 * start or not _near_line(np.array([value]), _ON_LINE)[0]:
+    if _turn(value, slope) == 0:
+        omega, value, slope = _nearest(transfer, omega, nu=value)
+    if abs(omega - start) > _REACH * start or not _near_line(np.array([value]), _ON_LINE)[0]:
         return None
     return _crossing(transfer, omega, value=value, slope=slope)
+
+
+def _nearest(transfer: Transfer, omega: float, *, nu: complex) -> tuple[float, complex, complex]:
+    """Secant method on the slope of Re(z_0 ν): the frequency where a touching root touches."""
+    other = omega * (1.0 + 1e-6)
+    value, slope = _track(transfer, omega, nu=nu)
+    rate, rate_other = (1j * slope).real, (1j * _track(transfer, other, nu=nu)[1]).real
+    for _ in range(_STEPS):
+        if rate == rate_other or abs(other - omega) <= 1e-13 * omega:
+            break
+        new = omega - rate * (omega - other) / (rate - rate_other)
+        if not abs(new - omega) <= _REACH * omega:
+            break
+        other, rate_other, omega = omega, rate, new
+        value, slope = _track(transfer, omega, nu=value)
+        rate = (1j * slope).real
+    return omega, value, slope
+
+
+def _turn(value: complex, slope: complex) -> int:
+    """Sign of Re(dλ/dd), the same for every k in d = (φ + 2πk)/ω: that of Re(dν/dλ · j)/…
+
+    With ν (z − z_0) = 1 and z = e^{-λd}: at fixed ω the root moves against Re(j dν/dλ).
+    """
+    rise = slope / (value * (value + 1.0)) * -1j
+    if abs(rise.real) < _SLOW * abs(rise):
+        return 0
+    return int(math.copysign(1.0, rise.real))
 
 
 def _track(transfer: Transfer, omega: float, *, nu: complex) -> tuple[complex, complex]:
@@ -106,10 +151,10 @@ def _crossing(transfer: Transfer, omega: float, *, value: complex, slope: comple
     z = z_0 * (1.0 + 1.0 / value)
     angle = -math.atan2(z.imag, z.real) % (2.0 * math.pi)
     delay = angle / omega
-    rise = slope * (1.0 / value) / (value * z / z_0) / (1j * omega)
-    direction = 0 if abs(rise.real) < _SLOW * abs(rise) else int(math.copysign(1, rise.real))
     mode, residual = mode_at(transfer.loop, omega, delay)
-    return Crossing(delay=delay, frequency=omega, direction=direction, mode=mode, residual=residual)
+    return Crossing(
+        delay=delay, frequency=omega, direction=_turn(value, slope), mode=mode, residual=residual
+    )
 
 
 def mode_at(loop: Loop, omega: float, delay: float) -> tuple[Array, float]:

@@ -79,7 +79,8 @@ def delay_margin(
 
     A root jω with z = e^{-jωd} solves det(jω − A_0 − z A_1) = 0. All frequencies but narrow bands
     are excluded by eigenvalue enclosures, the bands are refined by Newton's method, and a band
-    that nothing explains counts as uncertain. Necessary and sufficient for the frozen loop.
+    that nothing explains raises. Necessary and sufficient for the frozen loop. Roots that touch
+    the axis at zero frequency, and delays beyond 1e8/(‖A_0‖ + ‖A_1‖), count as never.
 
     Args:
         A_0: (n, n) undelayed part, 1/s.

@@ -12,10 +12,11 @@ import numpy as np
 
 from sealag.errors import SolverError
 from sealag.margin._loop import Transfer
-from sealag.typing import Array, BoolArray
+from sealag.typing import Array, BoolArray, IntArray
 
 _NARROW = 2e-9
 _FLOOR = 1e-7
+_SLOW = 1e-11
 _WORST_VECTORS = 1e10
 _MOST_INTERVALS = 400_000
 _CHUNK = 4096
@@ -68,7 +69,8 @@ def candidate_bands(transfer: Transfer) -> list[Cluster]:
             ]
         )
         lower, upper = lower[open_], upper[open_]
-        final = upper - lower <= _NARROW * np.maximum(upper, _FLOOR * top)
+        slow = upper <= _FLOOR * top
+        final = upper - lower <= np.where(slow, _SLOW * top, _NARROW * upper)
         narrow += list(zip(lower[final], upper[final], strict=True))
         lower, upper = lower[~final], upper[~final]
         middle = (lower + upper) / 2.0
@@ -99,56 +101,85 @@ def excluded(transfer: Transfer, lower: Array, upper: Array) -> BoolArray:
     """
     centre, half = (lower + upper) / 2.0, (upper - lower) / 2.0
     with np.errstate(all="ignore"):
-        if transfer.left is not None and transfer.right is not None:
-            change = _modal(transfer, centre, half)
-        else:
-            change = _resolvent(transfer, centre, half)
+        expand = _resolvent if transfer.left is None else _modal
+        change = expand(transfer, centre, half)
         nu, X = np.linalg.eig(transfer.reference * change.G)
         gap = np.abs(nu.real + 0.5)
-        return _gershgorin(X, change, gap=gap) | _henrici(nu, change, gap=gap.min(axis=1))
+        done = _henrici(nu, change, gap=gap.min(axis=1))
+        rest = np.flatnonzero(~done)
+        if len(rest):
+            some = change.only(rest)
+            done[rest] = _gershgorin(
+                nu[rest], X[rest], some, half=half[rest], turn=transfer.reference
+            )
+        return done
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Change:
-    """G at the centres of N intervals and a bound of how far it moves inside them.
+    """G at the centres of N intervals and bounds of how far it moves inside them.
 
-    |G(ω) − G|, seen through any basis, is at most |left| · diag(weight) · |right|, entry by entry.
+    Entry by entry and seen through any basis, |G(ω) − G| ≤ |left| diag(first) |right| and
+    |G(ω) − G − (ω − c) G'| ≤ |left| diag(second) |further|, with norms for entries when `full`.
     """
 
     G: Array
+    slope: Array
     left: Array
-    weight: Array
+    first: Array
+    second: Array
     right: Array
+    further: Array
     full: bool
     rounding: Array
 
-    def seen(self, X: Array, inverse: Array) -> Array:
-        """Return (N, r, r) entry-wise bounds of X⁻¹ (G(ω) − G) X."""
-        rows, columns = np.abs(inverse @ self.left), np.abs(self.right @ X)
+    def only(self, rest: IntArray) -> "_Change":
+        """The same for a choice of intervals."""
+        fields = {
+            name: value[rest] if len(value := getattr(self, name)) > 1 else value
+            for name in ("G", "slope", "left", "first", "second", "right", "further", "rounding")
+        }
+        return _Change(full=self.full, **fields)
+
+    def seen(self, X: Array, inverse: Array) -> tuple[Array, Array]:
+        """Return bounds of X⁻¹ (G(ω) − G) X (N, r, r) and of the diagonal of its rest (N, r)."""
+        rows = np.abs(inverse @ self.left)
+        columns, further = np.abs(self.right @ X), np.abs(self.further @ X)
         if self.full:
             rows = np.linalg.norm(rows, axis=2, keepdims=True)
             columns = np.linalg.norm(columns, axis=1, keepdims=True)
-        return (rows * self.weight[:, None, :]) @ columns
+            further = np.linalg.norm(further, axis=1, keepdims=True)
+        rest = ((rows * self.second[:, None, :]) * np.swapaxes(further, 1, 2)).sum(axis=2)
+        return (rows * self.first[:, None, :]) @ columns, rest
 
     def norm(self) -> Array:
         """Return (N,) bounds of ‖G(ω) − G‖ with the rounding of G."""
-        rank = self.G.shape[-1]
-        unit = np.broadcast_to(np.eye(rank), self.G.shape)
-        return np.linalg.norm(self.seen(unit, unit), axis=(1, 2)) + self.rounding
+        rows, columns = np.abs(self.left), np.abs(self.right)
+        if self.full:
+            rows = np.linalg.norm(rows, axis=(1, 2))
+            columns = np.linalg.norm(columns, axis=(1, 2))
+            return rows * self.first[:, 0] * columns + self.rounding
+        terms = np.linalg.norm(rows, axis=1) * np.linalg.norm(columns, axis=2)
+        return (terms * self.first).sum(axis=1) + self.rounding
 
 
 def _modal(transfer: Transfer, centre: Array, half: Array) -> _Change:
-    """Each pole's term changes by half / (distance at the centre · nearest distance)."""
-    assert transfer.left is not None and transfer.right is not None
+    """Expand each pole's term 1/(jω − λ) about the centre."""
+    assert transfer.left is not None
+    assert transfer.right is not None
     away = 1j * centre[:, None] - transfer.poles
     sideways = np.maximum(np.abs(away.imag) - half[:, None], 0.0)
     nearest = np.hypot(sideways, transfer.poles.real)
     terms = np.linalg.norm(transfer.left, axis=0) * np.linalg.norm(transfer.right, axis=1)
+    first = half[:, None] / (np.abs(away) * nearest)
     return _Change(
         G=(transfer.left[None] / away[:, None, :]) @ transfer.right,
+        slope=-1j * (transfer.left[None] / away[:, None, :] ** 2) @ transfer.right,
         left=transfer.left[None],
-        weight=half[:, None] / (np.abs(away) * nearest),
+        first=first,
+        second=first * half[:, None] / np.abs(away),
         right=transfer.right[None],
+        further=transfer.right[None],
         full=False,
         rounding=transfer.rounding * (terms / np.abs(away)).sum(axis=1),
     )
@@ -157,30 +188,47 @@ def _modal(transfer: Transfer, centre: Array, half: Array) -> _Change:
 def _resolvent(transfer: Transfer, centre: Array, half: Array) -> _Change:
     """Without eigenvectors: R(ω) − R = −j(ω−c) R (I + j(ω−c) R)⁻¹ R."""
     R = transfer.resolvents(centre)
-    size = np.linalg.norm(R, ord=2, axis=(1, 2))
-    reach = 1.0 - half * size
+    reach = 1.0 - half * np.linalg.norm(R, ord=2, axis=(1, 2))
     left, right = transfer.loop.C @ R, R @ transfer.loop.B
     error = np.linalg.norm(left, axis=(1, 2)) * np.linalg.norm(right, axis=(1, 2))
+    first = np.where(reach > 0.0, half / np.where(reach > 0.0, reach, 1.0), np.inf)[:, None]
     return _Change(
         G=left @ transfer.loop.B,
+        slope=-1j * left @ right,
         left=left,
-        weight=np.where(reach > 0.0, half / np.where(reach > 0.0, reach, 1.0), np.inf)[:, None],
+        first=first,
+        second=first * half[:, None],
         right=right,
+        further=R @ right,
         full=True,
         rounding=transfer.rounding * transfer.loop.size * error,
     )
 
 
-def _gershgorin(X: Array, change: _Change, *, gap: Array) -> BoolArray:
-    """Discs about the eigenvalues at the centre, in their eigenvectors' basis."""
+def _gershgorin(nu: Array, X: Array, change: _Change, *, half: Array, turn: complex) -> BoolArray:
+    """Discs about eigenvalues that move with their known slope, in the eigenvectors' basis.
+
+    The basis vector of the eigenvalue nearest to the line is scaled so that the other discs just
+    miss the line; its own radius is then of second order in the interval's width.
+    """
     condition = np.linalg.cond(X)
     usable = condition < _WORST_VECTORS
     safe = np.where(usable[:, None, None], X, np.eye(X.shape[-1]))
-    bound = change.seen(safe, np.linalg.inv(safe))
-    error = (change.rounding * condition)[:, None]
-    by_rows = (bound.sum(axis=2) + error < gap).all(axis=1)
-    by_columns = (bound.sum(axis=1) + error < gap).all(axis=1)
-    return (by_rows | by_columns) & usable
+    inverse = np.linalg.inv(safe)
+    bound, rest = change.seen(safe, inverse)
+    travel = turn * np.einsum("nij,njk,nki->ni", inverse, change.slope, safe)
+    moved = half[:, None] * np.abs(travel.real)
+    at = np.arange(nu.shape[1])
+    bound[:, at, at] = 0.0
+    gap = np.abs(nu.real + 0.5) - moved - rest - (change.rounding * condition)[:, None]
+    nearest = (gap - bound.sum(axis=2)).argmin(axis=1)
+    one = np.arange(len(nu))
+    coupling = bound[one, :, nearest]
+    room = gap - bound.sum(axis=2) + coupling
+    room[one, nearest] = np.inf
+    scale = np.where(coupling > 0.0, coupling / room, 0.0).max(axis=1)
+    own = gap[one, nearest] - 1.0001 * scale * bound[one, nearest].sum(axis=1)
+    return usable & (room > 0.0).all(axis=1) & (own > 0.0)
 
 
 def _henrici(nu: Array, change: _Change, *, gap: Array) -> BoolArray:
