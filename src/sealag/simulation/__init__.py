@@ -2,6 +2,7 @@
 
 from sealag.simulation._audit import Audit, Passivity
 from sealag.simulation._ground import FlatGround, Foot, Ground
+from sealag.simulation._hold import Hold, require_hold, static_hold
 from sealag.simulation._loop import closed_loop
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import EventKind, Outcome, PlantStop
@@ -18,6 +19,7 @@ __all__ = [
     "FlatGround",
     "Foot",
     "Ground",
+    "Hold",
     "Network",
     "Outcome",
     "Passivity",
@@ -27,4 +29,6 @@ __all__ = [
     "Run",
     "Scene",
     "closed_loop",
+    "require_hold",
+    "static_hold",
 ]
