@@ -79,7 +79,7 @@ def _endless(transfer: Transfer, band: Cluster) -> bool:
 
 
 def _near_line(nu: Array, tolerance: float) -> Array:
-    """Eigenvalues whose delay factor has modulus 1 to a tolerance, | |z| − 1 | ≈ |Re ν + ½|/|ν|²."""
+    """Eigenvalues whose delay factor has modulus 1 to a tolerance: |z| − 1 ≈ (Re ν + ½)/|ν|²."""
     return np.abs(nu.real + 0.5) < tolerance * np.maximum(np.abs(nu) ** 2, np.abs(nu))
 
 

@@ -97,7 +97,7 @@ def _differentiation(N: int) -> Array:
 
 
 def _newton(loop: Loop, delay: float, root: complex) -> complex:
-    """Newton on the smallest singular direction; a step that leaves the neighbourhood is refused."""
+    """Newton on the smallest singular direction; the start where it wanders off."""
     start = root
     for _ in range(12):
         late = np.exp(-root * delay) * loop.A_1
