@@ -1,6 +1,6 @@
 """The robot's rigid-body terms, written into an Instant."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -31,15 +31,16 @@ class Body:
             np.zeros((count, 6)),
         )
 
-    def evaluate(self, at: Instant) -> None:
-        """Evaluate at an instant's q and v."""
+    def evaluate(self, at: Instant, used: Iterable[int]) -> None:
+        """Evaluate at an instant's q and v, and only the frames with these numbers."""
         workspace = self._workspace
         workspace.update(at.q, at.v)
         at.M[:] = workspace.M
         at.nle[:] = workspace.nle
         at.potential = workspace.potential_energy
         jacobian, rotation, position, bias = self.frames
-        for i, name in enumerate(self._names):
+        for i in used:
+            name = self._names[i]
             rotation[i], position[i] = workspace.frame_placement(name)
             jacobian[i] = workspace.frame_jacobian(name)
             bias[i] = workspace.frame_bias(name)

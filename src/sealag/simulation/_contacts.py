@@ -45,6 +45,7 @@ class Contacts:
         self.feet, self.ground, self.rates = tuple(feet), ground, (stabilisation, stop_time)
         frames = [foot.contact.frame for foot in feet]
         self.body = Body(robot, [*frames, *loaded_frames])
+        self.all_frames = list(range(len(frames) + len(loaded_frames)))
         offsets = [foot.offsets() for foot in feet]
         self.foot_of = np.repeat(np.arange(len(feet)), [len(o) for o in offsets]).astype(np.int64)
         self.count = self.foot_of.size
@@ -54,10 +55,10 @@ class Contacts:
             np.concatenate([self.foot_of, loaded]).astype(np.int64),
             np.concatenate([*offsets, np.zeros((len(loaded_frames), 3))]),
         )
-        mu = np.array([feet[f].friction for f in self.foot_of])
+        owners = [self.feet[f] for f in self.foot_of.tolist()]
         self.C = np.tile(np.eye(3), (self.count, 1, 1))
         self.anchor = np.zeros((self.count, 3))
-        self.mu = np.ascontiguousarray(mu, dtype=float)
+        self.mu = np.array([foot.friction for foot in owners], dtype=float)
         self.ground_arrays = (self.C, self.anchor, self.mu)
         self.closed = np.zeros(self.count, np.int64)
         self.yielding = np.zeros(self.count)
@@ -66,7 +67,7 @@ class Contacts:
         for f, foot in enumerate(feet):
             self.torsion[f] = foot.torsional_damping, foot.torsional_radius
         self._weight = robot.mass * 9.81
-        self._radius = np.array([feet[f].radius for f in self.foot_of])
+        self._radius = np.array([foot.radius for foot in owners], dtype=float)
         self._margins, self._before = np.zeros(self.count), np.zeros(self.count)
 
     def open_all(self) -> None:
@@ -137,6 +138,11 @@ class Contacts:
         self.anchor[point] = at.position[point]
         self.closed[point] = 1
         self.yielding[point] = 0.0
+
+    def loaded_frames(self) -> list[int]:
+        """Return the numbers of the frames on which forces may act now."""
+        feet = dict.fromkeys(self.foot_of[self.closed == 1].tolist())
+        return [*feet, *self.all_frames[len(self.feet) :]]
 
     def loaded(self) -> Array:
         """Return 1.0 for every foot that has a closed point (F,)."""

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Self, overload
+from typing import Any, Self
 
 from sealag.delay import Constant, Delays, DelaySignal, Link, PacketOrder
 from sealag.errors import InputError
@@ -31,11 +31,7 @@ class Share:
         """Mean of the fraction, s."""
         return self.fraction * self.signal.mean
 
-    @overload
-    def at(self, t: float) -> float: ...
-    @overload
-    def at(self, t: Array) -> Array: ...
-    def at(self, t: float | Array) -> float | Array:
+    def at(self, t: float | Array) -> Any:
         """Return the fraction of the delay at ``t`` (s)."""
         return self.fraction * self.signal.at(t)
 

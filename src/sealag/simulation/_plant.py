@@ -240,12 +240,13 @@ class Plant:
         self._middle[:], self._end[:] = self._ahead[:, 0], self._ahead[:, 1]
         self._rates[0], self._accelerations[0] = now.v, now.acceleration
         self._powers[0] = now.power
+        used = self.contacts.loaded_frames()
         for k in (1, 2, 3):
             rigid.stage(
                 now.q, now.v, self._rates[k - 1], self._accelerations[k - 1],
                 step if k == 3 else 0.5 * step, base, self._u, stage.q, stage.v, self._rates[k],
             )  # fmt: skip
-            self._evaluate(stage, self._end if k == 3 else self._middle)
+            self._evaluate(stage, self._end if k == 3 else self._middle, used)
             self._accelerations[k] = stage.acceleration
             self._powers[k] = stage.power
         rigid.combine(now.q, now.v, self._rates, self._accelerations, step, base, nxt.q, nxt.v)
@@ -262,9 +263,12 @@ class Plant:
             )
         self.contacts.measure_gaps(nxt)
 
-    def _evaluate(self, at: Instant, motor: Array | None = None) -> None:
+    def _evaluate(
+        self, at: Instant, motor: Array | None = None, used: list[int] | None = None
+    ) -> None:
+        """Evaluate an instant; a stage brings its motor state and the frames that carry load."""
         contacts = self.contacts
-        contacts.body.evaluate(at)
+        contacts.body.evaluate(at, contacts.all_frames if used is None else used)
         solved = self._contact_kernel.evaluate(
             at.M, at.nle, contacts.body.frames, at.v, at.q[-self.robot.n :],
             at.z[:, :2] if motor is None else motor, self._spring, contacts.shape,
