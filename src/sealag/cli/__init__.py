@@ -1,1 +1,5 @@
-"""sealag.cli."""
+"""The command line `sealag`."""
+
+from sealag.cli._app import main
+
+__all__ = ["main"]

@@ -1,1 +1,30 @@
-"""sealag.design."""
+"""The user's project file, motions in and out, and the certificate of a design."""
+
+from sealag.design._certify import (
+    ASYMMETRY_TOLERANCE,
+    Bounds,
+    certified_bounds,
+    certify,
+    published_bounds,
+)
+from sealag.design._margins import LocalMargins, local_margins
+from sealag.design._motion_file import load_motion, motion_table, save_motion
+from sealag.design._project import System, load, resolve_project
+from sealag.design._starter import starter_project
+
+__all__ = [
+    "ASYMMETRY_TOLERANCE",
+    "Bounds",
+    "LocalMargins",
+    "System",
+    "certified_bounds",
+    "certify",
+    "load",
+    "load_motion",
+    "local_margins",
+    "motion_table",
+    "published_bounds",
+    "resolve_project",
+    "save_motion",
+    "starter_project",
+]

@@ -1,0 +1,131 @@
+"""The command line: parse, call one function, show. Nothing heavy is imported until it is used."""
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from sealag.errors import SealagError
+
+app = typer.Typer(
+    name="sealag",
+    help="How much network delay a robot with springs in its joints tolerates.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Project = Annotated[str, typer.Argument(help="Project file (TOML), or bundled:hume.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+MotionFile = Annotated[
+    Path | None,
+    typer.Option("--motion", help="Motion to certify: CSV, NPZ or Parquet with named columns."),
+]
+
+
+@app.command()
+def init(
+    urdf: Annotated[str, typer.Argument(help="The robot's URDF.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Where to write; ROBOT.toml if not given.")
+    ] = None,
+    floating: Annotated[
+        bool, typer.Option("--floating/--fixed", help="Whether the base moves freely.")
+    ] = True,
+) -> None:
+    """Write a commented project file with the robot's own joints in it."""
+    from sealag.cli._commands import init_project
+
+    path = init_project(urdf, out, floating_base=floating)
+    print(f"Wrote {path}; replace each FILL in it, then run: sealag certify {path}")
+
+
+@app.command()
+def certify(
+    project: Project,
+    motion: MotionFile = None,
+    criterion: Annotated[
+        str | None, typer.Option("--criterion", help="certified or published.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Certificate file; PROJECT.certificate.json if not given."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Bound the delay at every instant of a motion; exit status 1 if it is not certified."""
+    from sealag.cli._commands import certify_project
+
+    raise typer.Exit(
+        certify_project(project, motion, criterion=criterion, out=out, as_json=as_json)
+    )
+
+
+@app.command()
+def margin(project: Project, motion: MotionFile = None, as_json: Json = False) -> None:
+    """Compute the exact local delay margin of the frozen closed loop, along a motion."""
+    from sealag.cli._commands import margin_project
+
+    margin_project(project, motion, as_json=as_json)
+
+
+@app.command()
+def verify(
+    certificate: Annotated[Path, typer.Argument(help="Certificate file.")],
+    exact: Annotated[bool, typer.Option("--exact", help="Decide in rational arithmetic.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Check a certificate again from its numbers alone; exit status 1 if it does not hold."""
+    from sealag.cli._commands import verify_certificate
+
+    raise typer.Exit(verify_certificate(certificate, exact=exact, as_json=as_json))
+
+
+@app.command()
+def paper(
+    out: Annotated[Path, typer.Option("--out", help="Folder for page and CSVs.")] = Path(
+        "out/paper"
+    ),
+    as_json: Json = False,
+) -> None:
+    """Reproduce the paper's figures and check its claims one by one."""
+    from sealag.cli._commands import write_paper
+
+    write_paper(out, as_json=as_json)
+
+
+def show_json(answer: dict[str, Any]) -> None:
+    """Print one JSON object to standard output.
+
+    Args:
+        answer: what to print; it must hold finite numbers only.
+    """
+    print(json.dumps(answer, allow_nan=False))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and end the process with its status.
+
+    0 done, 1 the answer is no, 2 the input is wrong, 130 interrupted. Wrong input is told in one
+    sentence on standard error.
+
+    Args:
+        arguments: what follows the program's name; the process's own if None.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    try:
+        app(args=None if arguments is None else list(arguments), prog_name="sealag")
+    except SealagError as error:
+        print(f"sealag: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except KeyboardInterrupt:
+        print("sealag: interrupted", file=sys.stderr)
+        raise SystemExit(130) from None
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(0) from None

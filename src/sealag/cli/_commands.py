@@ -1,0 +1,147 @@
+"""What the commands do: call one function of the library and show its answer."""
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sealag.cli._app import show_json
+from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
+from sealag.errors import FileError, InputError
+from sealag.passivity import Certificate, Criterion, Status, write_certificate
+from sealag.robot import Motion
+
+
+def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
+    """Write a starter project; an existing file is not overwritten."""
+    stem = Path(urdf.rsplit(":", 1)[-1]).stem
+    path = out or Path(f"{stem}.toml")
+    if path.exists():
+        raise FileError(f"{path} exists already; choose another name with --out.")
+    where = urdf
+    if ":" not in urdf:
+        where = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
+    text = starter_project(urdf, floating_base=floating_base).replace(
+        f'urdf = "{urdf}"', f'urdf = "{where}"'
+    )
+    _write(path, text)
+    return path
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except OSError as error:
+        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _motion(system: System, path: Path | None) -> Motion | None:
+    chosen = path or system.motion_file
+    return None if chosen is None else load_motion(chosen, system.robot, contacts=system.contacts)
+
+
+def certify_project(
+    project: str, motion: Path | None, *, criterion: str | None, out: Path | None, as_json: bool
+) -> int:
+    """Certify, write the certificate and show the answer; 1 if it is not certified."""
+    if criterion is not None and criterion not in set(Criterion):
+        raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
+    system = load(project)
+    certificate = certify(system, _motion(system, motion), criterion=criterion)
+    path = out or Path(f"{resolve_project(project).stem}.certificate.json")
+    write_certificate(certificate, path)
+    if as_json:
+        show_json(certificate.summary())
+    else:
+        _show_certificate(certificate, path)
+    return 0 if certificate.status is Status.CERTIFIED else 1
+
+
+def _ms(seconds: float | None) -> str:
+    if seconds is None:
+        return "-"
+    return f"{seconds * 1e3:.3f} ms" if np.isfinite(seconds) else "any"
+
+
+def _show_certificate(certificate: Certificate, path: Path) -> None:
+    worst = certificate.worst
+    shares = sorted(worst.direction.items(), key=lambda item: -item[1])
+    limiting = ", ".join(f"{name} {share:.0%}" for name, share in shares[:3] if share >= 0.01)
+    crossing = certificate.first_crossing_s
+    stable = {True: "yes", False: "no", None: "has no answer here"}[certificate.stable]
+    verdict = certificate.status.value.replace("_", " ")
+    rows = [
+        ("verdict", f"{verdict} ({certificate.criterion} criterion)"),
+        ("largest delay", _ms(certificate.max_delay_s)),
+        ("delay of the design", _ms(certificate.delay_s)),
+        (
+            "worst instant",
+            f"{worst.instant} of {certificate.instants}, at {worst.time_s:.3f} s",
+        ),
+        ("gives in first", limiting),
+        ("exact local margin there", _ms(certificate.local_margin_s)),
+        ("first crossing there", _ms(crossing)),
+        ("unstable without delay", f"{certificate.unstable_modes} roots"),
+        ("potential has a minimum", stable),
+        ("published criterion says", _ms(certificate.published_max_delay_s)),
+        ("certificate", str(path)),
+    ]
+    for name, value in rows:
+        print(f"{name:26} {value}")
+    for reason in certificate.reasons:
+        print(f"not certified because {reason}")
+    for assumption in certificate.assumptions:
+        print(f"assumes that {assumption}")
+
+
+def margin_project(project: str, motion: Path | None, *, as_json: bool) -> None:
+    """Show the exact local margin at every instant, or at a sample of a long motion."""
+    from sealag.design import local_margins
+
+    system = load(project)
+    found = local_margins(system, _motion(system, motion))
+    answer: dict[str, Any] = found.summary()
+    if as_json:
+        show_json(answer)
+        return
+    print(f"{'local margin':26} {_ms(found.delay_s)}")
+    print(f"{'first crossing':26} {_ms(found.first_crossing_s)}")
+    print(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
+    print(f"{'unstable without delay':26} {found.unstable_modes} roots")
+    print(f"{'neutral by symmetry':26} {found.neutral} roots")
+    print(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
+    mode = sorted(found.mode.items(), key=lambda item: -item[1])
+    print(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
+
+
+def verify_certificate(path: Path, *, exact: bool, as_json: bool) -> int:
+    """Check a certificate; 1 if it does not hold."""
+    from sealag.passivity import verify
+
+    result = verify(path, exact=exact)
+    if as_json:
+        show_json(result.to_json_dict())
+    else:
+        for check in result.checks:
+            print(f"{'ok ' if check.ok else 'BAD'}  {check.name}: {check.detail}")
+        print("the certificate holds" if result.valid else "the certificate does not hold")
+    return 0 if result.valid else 1
+
+
+def write_paper(out: Path, *, as_json: bool) -> None:
+    """Compute and write the paper page."""
+    from sealag.cli._paper import make_paper
+
+    answer = make_paper(out, progress=lambda text: print(text, file=sys.stderr, flush=True))
+    if as_json:
+        show_json(answer)
+    else:
+        print(f"Wrote {answer['page']}")

@@ -1,0 +1,155 @@
+"""What a project file may say: one class a section, every key with its unit in its name or here."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+Milliseconds = Annotated[FiniteFloat, Field(ge=0, le=5000)]
+
+
+class Section(BaseModel):
+    """A table of the project file; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class RobotSection(Section):
+    """[robot]"""
+
+    urdf: str
+    base: Literal["floating", "fixed"]
+    actuated: list[str] | None = None
+
+
+class PostureSection(Section):
+    """[posture]: the configuration that is certified without a motion, rad and m."""
+
+    base_position: Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
+    base_quaternion_xyzw: Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)] = [
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+    ]
+    joints: dict[str, FiniteFloat] = {}
+
+
+class ActuatorKeys(Section):
+    """Keys of [actuators.default] and [actuators.joint.<name>], SI units."""
+
+    spring_stiffness: Positive | None = None
+    rotor_inertia: Positive | None = None
+    inertia_shaping: Positive | None = None
+    motor_damping: Positive | None = None
+    spring_damping: NotNegative | None = None
+    coulomb_friction: NotNegative | None = None
+    viscous_friction: NotNegative | None = None
+    torque_limit: Positive | None = None
+    velocity_limit: Positive | None = None
+    torque_bandwidth: Positive | None = None
+
+
+class ActuatorsSection(Section):
+    """[actuators]: what holds for all joints, and what differs at some."""
+
+    default: ActuatorKeys = ActuatorKeys()
+    joint: dict[str, ActuatorKeys] = {}
+
+
+class ContactSection(Section):
+    """[[contacts]]"""
+
+    frame: str
+    kind: Literal["point", "surface"] = "point"
+
+
+class ControllerSection(Section):
+    """[controller]"""
+
+    feedback: Literal["motor", "static_joint", "static_joint_tank", "joint"]
+    gravity: Literal["feedback", "planned", "none"]
+    stiffness_form: Literal["symmetric", "published", "force"] = "symmetric"
+    task_inertia: Literal["lambda_ts", "lambda_star"] = "lambda_ts"
+    criterion: Literal["certified", "published"] = "certified"
+
+
+class TaskSection(Section):
+    """[[tasks]]"""
+
+    name: str
+    kind: Literal["com", "position", "orientation", "pose", "posture"]
+    stiffness: NotNegative | list[NotNegative]
+    frame: str | None = None
+    joints: list[str] = []
+    axes: list[Literal["x", "y", "z", "rx", "ry", "rz"]] = []
+    priority: Annotated[int, Field(ge=1)] = 1
+
+
+class ConstantDelay(Section):
+    """kind = "constant" """
+
+    kind: Literal["constant"]
+    value_ms: Milliseconds
+
+
+class SinusoidDelay(Section):
+    """kind = "sinusoid": mean + amplitude sin(ω t + phase)"""
+
+    kind: Literal["sinusoid"]
+    mean_ms: Milliseconds
+    amplitude_ms: Milliseconds
+    angular_frequency_rad_s: FiniteFloat = 1.0
+    phase_rad: FiniteFloat = 0.0
+
+
+class TableDelay(Section):
+    """kind = "table": linear between instants"""
+
+    kind: Literal["table"]
+    time_s: list[FiniteFloat]
+    delay_ms: list[Milliseconds]
+
+
+class SamplesDelay(Section):
+    """kind = "samples": measured round trips, one a line, in ms"""
+
+    kind: Literal["samples"]
+    file: str
+    period_s: Positive
+    quantile: Annotated[FiniteFloat, Field(gt=0, le=1)] = 1.0
+
+
+DelayKeys = Annotated[
+    ConstantDelay | SinusoidDelay | TableDelay | SamplesDelay, Field(discriminator="kind")
+]
+
+
+class DelaysSection(Section):
+    """[delays]"""
+
+    central_round_trip: DelayKeys
+    embedded_round_trip: DelayKeys
+    sample_time_ms: Milliseconds = 0.0
+    up_share: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.5
+
+
+class MotionSection(Section):
+    """[motion]"""
+
+    file: str
+
+
+class Project(Section):
+    """A whole project file."""
+
+    robot: RobotSection
+    posture: PostureSection = PostureSection()
+    actuators: ActuatorsSection
+    contacts: list[ContactSection] = []
+    controller: ControllerSection
+    tasks: Annotated[list[TaskSection], Field(min_length=1)]
+    delays: DelaysSection
+    motion: MotionSection | None = None
+    simulation: dict[str, Any] = {}
