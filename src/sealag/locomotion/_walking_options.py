@@ -1,0 +1,170 @@
+"""What a walk should look like, and the means by which the controller works against the delay."""
+
+import math
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from typing import Any, Protocol, Self
+
+from sealag.errors import InputError
+from sealag.whole_body import Feedback
+
+
+class Heights(Protocol):
+    """Terrain as the walk needs it."""
+
+    def height(self, x: float, y: float) -> float:
+        """Return the ground's height (m) at a point.
+
+        Args:
+            x: World x, m.
+            y: World y, m.
+        """
+        ...
+
+
+class Prediction(StrEnum):
+    """How the state is predicted over the delay."""
+
+    NONE = "none"
+    """The delayed state is taken for the present one."""
+    VELOCITY = "velocity"
+    """The measured velocity is extrapolated."""
+    MODEL = "model"
+    """Links, springs and motors are moved under the commands still in flight."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkingGait:
+    """The gait that the walk shall have. Assumptions of ours: the paper gives none of them.
+
+    Attributes:
+        apex_speed: Forward speed of the CoM over the stance foot, m/s.
+        step_time: From touchdown to touchdown, s.
+        transfer_time: Double support at the step's beginning in which the weight moves from the
+            old to the new foot, s.
+        com_height: CoM over the ground, mean of two footholds, m.
+        step_width: Distance of successive footholds across the direction of walking, m.
+        clearance: Height of the swing foot over the higher of the grounds below it, m.
+        foot_radius: Height of the foot frame over the ground when standing, m.
+        smallest_width: Footholds are never placed closer than this across, m.
+
+    Raises:
+        InputError: A value is not a positive number, or the weight transfer fills the step.
+    """
+
+    apex_speed: float = 0.5
+    step_time: float = 0.35
+    transfer_time: float = 0.06
+    com_height: float = 0.86
+    step_width: float = 0.26
+    clearance: float = 0.08
+    foot_radius: float = 0.025
+    smallest_width: float = 0.12
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(
+                    f"The gait's {field.name} is {value}; it must be positive and finite."
+                )
+        if self.transfer_time > 0.6 * self.step_time:
+            raise InputError(
+                f"The weight transfer of {self.transfer_time:g} s leaves too little of the step of "
+                f"{self.step_time:g} s: at most 60 % is right."
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkingOptions:
+    """Means and gains of the walking controller; each means can be left out.
+
+    Attributes:
+        preview: Work ahead of the delay: the references are those of the instant at which the
+            command will reach the motors.
+        embedded_delay: What the command's way lasts longer than the measurement's, half the mean
+            T_L, s; the measurement's age is known, the rest of the way is taken as long.
+        prediction: How the state at that instant is predicted.
+        acceleration_feedforward: The tasks' planned accelerations enter the law.
+        velocity_feedforward: The embedded damping acts on θ̇ − q̇_d, not on θ̇: D_θ q̇_d is added
+            to the command, with q̇_d the joint rates of the planned task velocities.
+        position_rate: Planned swing-foot velocities return position errors at this rate, 1/s.
+        lead: The springs' own motion is fed forward too: (D_θ/K) dτ/dt, the other half of the
+            planned motor velocity q̇_d + K⁻¹ τ̇.
+        lead_time: Time constant of the derivative of the lead, s.
+        torque_feedback: Gain on the difference of task torque and predicted spring torque.
+        task_damping: Damping ratio of the task-space feedback on predicted velocities.
+        height_stiffness: K_x of the CoM height, 1/s².
+        posture_stiffness: K_x of torso roll and pitch, 1/s².
+        swing_stiffness: K_x of the swing foot, 1/s².
+        momentum_placement: The footstep is placed by the angular momentum about the stance foot
+            (legs included), not by the CoM velocity.
+        apex_correction: The plan's apex speed is met by the CoM itself: what the legs' momentum
+            takes from it at the apex is added.
+        placement_time: Time constant over which the predicted end of the step is averaged, s.
+        placement_freeze: The foothold is fixed this long before touchdown, s.
+        early_contact: A foot seen on the ground late in its swing begins the next step.
+        odometry: The base's position and velocity come from the stance leg, the joint encoders
+            and the IMU; the measured ones are not used.
+        feedback: What the published law takes for the joint positions: link side, motor side, or
+            q̄(θ) by one fixed-point iteration of Eq. (15) per tick.
+
+    Raises:
+        InputError: A gain is negative or not finite.
+    """
+
+    preview: bool = True
+    embedded_delay: float = 0.0015
+    prediction: Prediction = Prediction.MODEL
+    acceleration_feedforward: bool = True
+    velocity_feedforward: bool = True
+    position_rate: float = 10.0
+    lead: bool = True
+    lead_time: float = 0.005
+    torque_feedback: float = 1.0
+    task_damping: float = 0.5
+    height_stiffness: float = 100.0
+    posture_stiffness: float = 100.0
+    swing_stiffness: float = 400.0
+    momentum_placement: bool = True
+    apex_correction: bool = True
+    placement_time: float = 0.05
+    placement_freeze: float = 0.05
+    early_contact: bool = True
+    odometry: bool = True
+    feedback: Feedback = Feedback.JOINT
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "prediction", Prediction(self.prediction))
+        object.__setattr__(self, "feedback", Feedback(self.feedback))
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float) and not (math.isfinite(value) and value >= 0.0):
+                raise InputError(
+                    f"The walking option {field.name} is {value}; 0 or a positive number is right."
+                )
+        if self.lead_time == 0.0:
+            raise InputError("The lead_time must be positive; leave the lead out with lead=False.")
+        if self.feedback not in (Feedback.JOINT, Feedback.MOTOR, Feedback.STATIC_JOINT):
+            raise InputError("The walking law feeds back joint, motor or static_joint.")
+
+    @classmethod
+    def published(cls, **changes: Any) -> Self:
+        """Return the law of Eqs. (11) and (17) with plain D_θ θ̇: position feedback and gravity.
+
+        The footsteps and the order of the steps are planned as always.
+
+        Args:
+            changes: Options to set otherwise.
+        """
+        options: dict[str, Any] = {
+            "preview": False,
+            "prediction": Prediction.NONE,
+            "acceleration_feedforward": False,
+            "velocity_feedforward": False,
+            "lead": False,
+            "torque_feedback": 0.0,
+            "task_damping": 0.0,
+            "feedback": Feedback.STATIC_JOINT,
+        }
+        return cls(**{**options, **changes})

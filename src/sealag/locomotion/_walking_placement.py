@@ -1,0 +1,155 @@
+"""Where the next foot must land, from the predicted end of the step."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.locomotion._walking_options import WalkingGait, WalkingOptions
+from sealag.locomotion._walking_step import StepReferences
+from sealag.typing import Array
+
+GRAVITY = 9.81
+_STEPS = 16
+_FORWARD = (-0.15, 0.55)  # m from the stance foot: what the legs reach
+_WIDEST = 0.5  # m
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeriodicGait:
+    """The periodic motion of the pendulum on flat ground that a gait asks for.
+
+    During the weight transfer of duration d the centre of pressure moves linearly from foot to
+    foot. With ω² = g/h, e = exp(ωT) and κ = e (1 − (1 − exp(−ωd))/(ωd)), the capture point
+    ξ = x + ẋ/ω at the end of a step, from the foot stood on, is
+
+        ξ_x = (v_a/ω) exp(ω(T−d)/2),   ξ_y = w (e−κ)/(e+1),   and   L = ξ_x (e−1)/(e−κ).
+
+    Attributes:
+        rate: ω, 1/s.
+        growth: e.
+        carried: κ, the part of it that the old foot still carries.
+        end_forward: ξ_x, m.
+        end_outward: ξ_y, m.
+        step_length: L, m.
+        apex_outward: Distance of the CoM from the stance foot across, at the apex, m.
+    """
+
+    rate: float
+    growth: float
+    carried: float
+    end_forward: float
+    end_outward: float
+    step_length: float
+    apex_outward: float
+
+
+def periodic_gait(gait: WalkingGait) -> PeriodicGait:
+    """Return the pendulum's periodic motion of a gait.
+
+    Args:
+        gait: The plan.
+    """
+    rate = math.sqrt(GRAVITY / gait.com_height)
+    growth = math.exp(rate * gait.step_time)
+    shift = rate * gait.transfer_time
+    carried = growth * (1.0 - (1.0 - math.exp(-shift)) / shift)
+    swing = math.exp(0.5 * rate * (gait.step_time - gait.transfer_time))
+    forward = gait.apex_speed / rate * swing
+    outward = gait.step_width * (growth - carried) / (growth + 1.0)
+    return PeriodicGait(
+        rate=rate,
+        growth=growth,
+        carried=carried,
+        end_forward=forward,
+        end_outward=outward,
+        step_length=forward * (growth - 1.0) / (growth - carried),
+        apex_outward=outward / swing,
+    )
+
+
+class Placement:
+    """Places the next foot so that the step after it ends at the plan's capture point.
+
+    The present step is integrated to its end with the planned height; what it will end with is a
+    constant of the undisturbed motion, so it is averaged over time. Errors of the capture point
+    are then undone within one step, those of its stable counterpart decay by exp(−ωT) per step.
+
+    Args:
+        gait: The plan.
+        options: Which means are used.
+        mass: The robot's, kg.
+    """
+
+    def __init__(self, gait: WalkingGait, options: WalkingOptions, mass: float) -> None:
+        from sealag.kernels import walking
+
+        self._kernel, self._gait, self._options, self._mass = walking, gait, options, mass
+        self.plan = periodic_gait(gait)
+        self._x, self._v = np.zeros(2), np.zeros(2)
+        self._end_x, self._end_v = np.zeros(2), np.zeros(2)
+        self._fresh = True
+        self._apex_loss: float | None = None
+        self._before = 0.0
+
+    def restart(self) -> None:
+        """Forget the average: a new step begins."""
+        self._fresh, self._before = True, 0.0
+
+    def update(
+        self, phase: float, step: StepReferences, com: Array, com_rate: Array, *,
+        angular: Array, period: float,
+    ) -> None:  # fmt: skip
+        """Re-plan the target of the swing foot.
+
+        Args:
+            phase: Time since the step's touchdown, s.
+            step: The step's references; ``target`` is moved.
+            com: (3,) m.
+            com_rate: (3,) m/s.
+            angular: Angular momentum about the CoM (3,), kg m²/s.
+            period: Time since the last call, s.
+        """
+        gait, options = self._gait, self._options
+        self._x[:], self._v[:] = com[:2], com_rate[:2]
+        arm = max(float(com[2] - step.new[2]), 0.4)
+        if options.momentum_placement:
+            self._v[0] += angular[1] / (self._mass * arm)
+            self._v[1] -= angular[0] / (self._mass * arm)
+        self._watch_apex(float(com[0] - step.new[0]), float(angular[1]) / (self._mass * arm))
+        self._kernel.pendulum(
+            self._x, self._v, phase, gait.step_time, gait.transfer_time, step.old, step.new,
+            step.height, step.offset, _STEPS,
+        )  # fmt: skip
+        share = 1.0
+        if not self._fresh and options.placement_time > 0.0:
+            share = 1.0 - math.exp(-period / options.placement_time)
+        self._fresh = False
+        self._end_x += share * (self._x - self._end_x)
+        self._end_v += share * (self._v - self._end_v)
+        if gait.step_time - phase > options.placement_freeze:
+            self._place(step)
+
+    def _watch_apex(self, ahead: float, loss: float) -> None:
+        """Learn what the legs' momentum takes from the CoM's speed at the apex."""
+        if self._apex_loss is None:
+            self._apex_loss = loss
+        elif self._before < 0.0 <= ahead:
+            self._apex_loss += 0.5 * (loss - self._apex_loss)
+        self._before = ahead
+
+    def _place(self, step: StepReferences) -> None:
+        """Solve ξ(T) = u + ξ_plan for the foothold u of the next step."""
+        plan, side = self.plan, step.outward()
+        speed = 1.0
+        if self._options.apex_correction and self._options.momentum_placement:
+            speed += (self._apex_loss or 0.0) / self._gait.apex_speed
+        wanted = (plan.end_forward * speed, -side * plan.end_outward)
+        u = [0.0, 0.0]
+        for k in range(2):
+            capture = self._end_x[k] + self._end_v[k] / plan.rate - step.new[k]
+            u[k] = (plan.growth * capture - wanted[k]) / (plan.growth - plan.carried)
+        outward = min(max(side * u[1], self._gait.smallest_width), _WIDEST)
+        step.target[0] = step.new[0] + min(max(u[0], _FORWARD[0]), _FORWARD[1])
+        step.target[1] = step.new[1] + side * outward
+        step.target[2] = step.ground(float(step.target[0]), float(step.target[1]))

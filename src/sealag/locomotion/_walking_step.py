@@ -1,0 +1,158 @@
+"""References within a step: CoM height and swing foot, continuous while the foothold moves."""
+
+import numpy as np
+
+from sealag.locomotion._walking_options import Heights, WalkingGait
+from sealag.typing import Array
+
+_STILL = 0.93  # share of the swing after which the foot no longer moves horizontally
+_SEARCH = 0.3  # m/s at which a foot that has not met the ground is lowered
+_SIDE = (1.0, -1.0)  # left, right
+
+
+class StepReferences:
+    """The references of the step under way; feet are numbered 0 left, 1 right.
+
+    Args:
+        gait: The plan.
+        terrain: Ground heights.
+        step_length: Length of the plan's steps, m.
+
+    Attributes:
+        begin: Instant of the step's touchdown on the controller's clock, s.
+        stance: Foot stood on.
+        old: Where the foot to be lifted stands (3,), m.
+        new: Where the foot stood on stands (3,), m.
+        target: Where the swing foot shall land (3,), m.
+        height: Quintic of the CoM height (6,), time from phase ``offset``.
+        offset: Phase at which that quintic begins, s.
+        swing: Position, velocity, acceleration of the swing foot (3, 3).
+        swinging: Whether the foot has left the ground.
+    """
+
+    def __init__(self, gait: WalkingGait, terrain: Heights, *, step_length: float) -> None:
+        from sealag.kernels import walking
+
+        self._kernel, self._gait, self._terrain = walking, gait, terrain
+        self._length = step_length
+        self.begin, self.stance, self.offset = 0.0, 1, 0.0
+        self.old, self.new, self.target = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.height = np.zeros(6)
+        self.swing = np.zeros((3, 3))
+        self.swinging = False
+        self._now, self._end, self._c = np.zeros(3), np.zeros(3), np.zeros(6)
+        self._lift, self._bump = 0.0, gait.clearance
+
+    def outward(self) -> float:
+        """Return the sign of y from the stance foot to the swing foot."""
+        return _SIDE[1 - self.stance]
+
+    def ground(self, x: float, y: float) -> float:
+        """Return the height (m) of a foot's frame that stands at ``x``, ``y``."""
+        return self._terrain.height(x, y) + self._gait.foot_radius
+
+    def phase(self, t: float) -> float:
+        """Return the time since the step's touchdown, s."""
+        return t - self.begin
+
+    def start(self, t: float, *, phase: float, com: Array, feet: Array, swing: Array) -> None:
+        """Begin in the middle of a step.
+
+        Args:
+            t: Now, s.
+            phase: Phase of the step now, s.
+            com: CoM height and its rate (2,), m, m/s.
+            feet: Positions (2, 3), m.
+            swing: Velocity of the swing foot (3,), m/s.
+        """
+        self.begin, self.offset = t - phase, phase
+        self.new[:] = feet[self.stance]
+        self.old[:] = self.new
+        self.old[0] -= self._length
+        self.old[1] += self.outward() * self._gait.step_width
+        self._lift = self.ground(self.old[0], self.old[1])
+        self._now[:] = com[0], com[1], 0.0
+        self._aim()
+        self.swing[0], self.swing[1], self.swing[2] = feet[1 - self.stance], swing, 0.0
+        self.swinging = True
+        self._clear()
+
+    def change(self, t: float, feet: Array) -> None:
+        """Stand on the foot that has swung.
+
+        Args:
+            t: Now, s.
+            feet: Positions (2, 3), m.
+        """
+        self._kernel.quintic_at(
+            self.height, min(self.phase(t), self._span()) - self.offset, self._now
+        )
+        self.begin, self.offset, self.stance = t, 0.0, 1 - self.stance
+        self.old[:], self.new[:] = feet[1 - self.stance], feet[self.stance]
+        self.swinging = False
+        self._aim()
+
+    def _span(self) -> float:
+        return self._gait.step_time
+
+    def _aim(self) -> None:
+        """Set a first target and plan the CoM height to the mean of the footholds ahead."""
+        gait = self._gait
+        self.target[0] = self.new[0] + self._length
+        self.target[1] = self.new[1] + self.outward() * gait.step_width
+        self.target[2] = self.ground(self.target[0], self.target[1])
+        ahead = self.ground(self.target[0] + self._length, self.new[1])
+        self._end[0] = gait.com_height + 0.5 * (self.new[2] + self.target[2]) - gait.foot_radius
+        self._end[1] = 0.25 * (ahead - self.new[2]) / gait.step_time
+        self._end[2] = 0.0
+        self._kernel.quintic(self._now, self._end, self._span() - self.offset, self.height)
+
+    def height_at(self, t: float, out: Array) -> None:
+        """Write CoM height, rate and acceleration (3,) at ``t`` (s) into ``out``."""
+        self._kernel.quintic_at(self.height, min(self.phase(t), self._span()) - self.offset, out)
+
+    def lift(self, foot: Array) -> None:
+        """Begin the swing where the foot is (3,), m."""
+        self.swing[0], self.swing[1:] = foot, 0.0
+        self._lift = float(foot[2])
+        self.swinging = True
+        self._clear()
+
+    def _clear(self) -> None:
+        """Raise the swing so that it clears the ground between both footholds."""
+        start, end = self.old, self.target
+        excess = 0.0
+        for u in (0.2, 0.35, 0.5, 0.65, 0.8):
+            x, y = start[:2] + u * (end[:2] - start[:2])
+            line = self._lift + u * (end[2] - self._lift)
+            excess = max(excess, self.ground(float(x), float(y)) - line)
+        self._bump = self._gait.clearance + excess
+
+    def move(self, t: float, period: float) -> None:
+        """Move the swing reference to ``t`` (s), one ``period`` (s) after the last."""
+        gait, phase = self._gait, self.phase(t)
+        duration = gait.step_time - gait.transfer_time
+        left = gait.transfer_time + _STILL * duration - phase
+        for i in range(2):
+            if left > 0.015:
+                self._end[:] = self.target[i], 0.0, 0.0
+                self._kernel.quintic(self.swing[:, i], self._end, left, self._c)
+                self._kernel.quintic_at(self._c, min(period, left), self._now)
+                self.swing[:, i] = self._now
+            else:
+                self.swing[1:, i] = 0.0
+        u = min(max((phase - gait.transfer_time) / duration, 0.0), 1.0)
+        self._vertical(u, duration)
+        if u >= 1.0:
+            late = phase - gait.step_time
+            self.swing[:, 2] = self.target[2] - _SEARCH * late, -_SEARCH, 0.0
+
+    def _vertical(self, u: float, duration: float) -> None:
+        rise, w = self.target[2] - self._lift, 1.0 - u
+        self.swing[0, 2] = (
+            self._lift + rise * u**3 * (10 - 15 * u + 6 * u * u) + 64 * self._bump * (u * w) ** 3
+        )
+        rate = 30 * rise * (u * w) ** 2 + 192 * self._bump * (u * w) ** 2 * (w - u)
+        bend = 60 * rise * u * w * (w - u)
+        bend += 384 * self._bump * u * w * ((w - u) ** 2 - u * w)
+        self.swing[1, 2], self.swing[2, 2] = rate / duration, bend / duration**2
