@@ -29,7 +29,7 @@ class Passivity:
         passive: True if the slack never fell below ``-tolerance``.
         first_violation: First logged instant at which it did, s; None if never.
         joint: Joint that had delivered most energy at that instant; None if never.
-        tolerance: What rounding and integration may spend, J.
+        tolerance: What rounding and integration may spend: twice the largest residual, J.
     """
 
     slack: Array
@@ -107,7 +107,8 @@ def audit(
     """
     flows = {name: joint[:, k] for k, name in enumerate(JOINT_FLOWS)}
     drive = flows["command"] - flows["damping"]
-    tolerance = 1e-6 * float(throughput[-1]) + 1e-9 if time.size else 0.0
+    spent = float(np.abs(residual).max(initial=0.0))
+    tolerance = 2.0 * spent + 1e-9 * float(throughput[-1]) + 1e-12 if time.size else 0.0
     s_j = stores[:, :3].sum(axis=1) + shaped
     joint_slack = drive.sum(axis=1) + scalar[:, 3] - (s_j - s_j[:1])
     control = None

@@ -42,5 +42,5 @@ class Body:
         for i in used:
             name = self._names[i]
             rotation[i], position[i] = workspace.frame_placement(name)
-            jacobian[i] = workspace.frame_jacobian(name)
+            jacobian[i] = workspace.frame_jacobian(name).reshape(6, -1)  # one joint: a vector
             bias[i] = workspace.frame_bias(name)
