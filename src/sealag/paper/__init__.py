@@ -1,1 +1,17 @@
-"""sealag.paper."""
+"""The paper's figures and statements, computed here and checked one by one."""
+
+from sealag.paper._claims import Claim, Verdict
+from sealag.paper._figure4 import CertifiedVariant, Figure4, figure_4, figure_4_claims
+from sealag.paper._unsafe import UnsafeExample, sea_loop, unsafe_examples
+
+__all__ = [
+    "CertifiedVariant",
+    "Claim",
+    "Figure4",
+    "UnsafeExample",
+    "Verdict",
+    "figure_4",
+    "figure_4_claims",
+    "sea_loop",
+    "unsafe_examples",
+]

@@ -79,9 +79,7 @@ def _one_joint(M: float, K_q: float, *, link_feedback: bool = False) -> UnsafeEx
     published = max_delay(np.eye(1), np.eye(1), np.array([K_q]), D)
     K_theta = np.array([[1.0 / (1.0 / K_q - 1.0 / K[0])]])
     F = np.array([[K_q]]) if link_feedback else K_theta
-    margin = delay_margin(
-        *sea_loop(np.array([[M]]), K, B_s, D=D, F=F, link_feedback=link_feedback)
-    )
+    margin = delay_margin(*sea_loop(np.array([[M]]), K, B_s, D=D, F=F, link_feedback=link_feedback))
     signal = "link angle" if link_feedback else "q̄(θ)"
     certified = None if link_feedback else float(max_delay_from_stiffness(K_theta, D).delay)
     return UnsafeExample(
