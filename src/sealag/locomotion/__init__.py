@@ -10,16 +10,27 @@ from sealag.locomotion._terrain import (
     stairs,
 )
 from sealag.locomotion._walk_motion import walk_motion
+from sealag.locomotion._walking import WalkingController
+from sealag.locomotion._walking_options import Prediction, WalkingGait, WalkingOptions
+from sealag.locomotion._walking_placement import PeriodicGait, periodic_gait
+from sealag.locomotion._walking_start import walking_start
 
 __all__ = [
     "FlatTerrain",
+    "PeriodicGait",
+    "Prediction",
     "ProfileTerrain",
     "Stance",
     "Terrain",
     "WalkPlan",
+    "WalkingController",
+    "WalkingGait",
+    "WalkingOptions",
     "paper_terrain",
+    "periodic_gait",
     "plan_walk",
     "rough_terrain",
     "stairs",
     "walk_motion",
+    "walking_start",
 ]

@@ -3,23 +3,10 @@
 import math
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 from sealag.errors import InputError
 from sealag.whole_body import Feedback
-
-
-class Heights(Protocol):
-    """Terrain as the walk needs it."""
-
-    def height(self, x: float, y: float) -> float:
-        """Return the ground's height (m) at a point.
-
-        Args:
-            x: World x, m.
-            y: World y, m.
-        """
-        ...
 
 
 class Prediction(StrEnum):

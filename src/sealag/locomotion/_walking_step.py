@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from sealag.locomotion._walking_options import Heights, WalkingGait
+from sealag.locomotion._terrain import Terrain
+from sealag.locomotion._walking_options import WalkingGait
 from sealag.typing import Array
 
 _STILL = 0.93  # share of the swing after which the foot no longer moves horizontally
@@ -28,19 +29,22 @@ class StepReferences:
         offset: Phase at which that quintic begins, s.
         swing: Position, velocity, acceleration of the swing foot (3, 3).
         swinging: Whether the foot has left the ground.
+        transfer_time: Duration of the double support, s.
     """
 
-    def __init__(self, gait: WalkingGait, terrain: Heights, *, step_length: float) -> None:
+    def __init__(self, gait: WalkingGait, terrain: Terrain, *, step_length: float) -> None:
         from sealag.kernels import walking
 
         self._kernel, self._gait, self._terrain = walking, gait, terrain
         self._length = step_length
         self.begin, self.stance, self.offset = 0.0, 1, 0.0
+        self.transfer_time = gait.transfer_time
         self.old, self.new, self.target = np.zeros(3), np.zeros(3), np.zeros(3)
         self.height = np.zeros(6)
         self.swing = np.zeros((3, 3))
         self.swinging = False
         self._now, self._end, self._c = np.zeros(3), np.zeros(3), np.zeros(6)
+        self._moved = np.zeros(3)
         self._lift, self._bump = 0.0, gait.clearance
 
     def outward(self) -> float:
@@ -85,15 +89,12 @@ class StepReferences:
             feet: Positions (2, 3), m.
         """
         self._kernel.quintic_at(
-            self.height, min(self.phase(t), self._span()) - self.offset, self._now
+            self.height, min(self.phase(t), self._gait.step_time) - self.offset, self._now
         )
         self.begin, self.offset, self.stance = t, 0.0, 1 - self.stance
         self.old[:], self.new[:] = feet[1 - self.stance], feet[self.stance]
         self.swinging = False
         self._aim()
-
-    def _span(self) -> float:
-        return self._gait.step_time
 
     def _aim(self) -> None:
         """Set a first target and plan the CoM height to the mean of the footholds ahead."""
@@ -105,11 +106,13 @@ class StepReferences:
         self._end[0] = gait.com_height + 0.5 * (self.new[2] + self.target[2]) - gait.foot_radius
         self._end[1] = 0.25 * (ahead - self.new[2]) / gait.step_time
         self._end[2] = 0.0
-        self._kernel.quintic(self._now, self._end, self._span() - self.offset, self.height)
+        self._kernel.quintic(self._now, self._end, self._gait.step_time - self.offset, self.height)
 
     def height_at(self, t: float, out: Array) -> None:
         """Write CoM height, rate and acceleration (3,) at ``t`` (s) into ``out``."""
-        self._kernel.quintic_at(self.height, min(self.phase(t), self._span()) - self.offset, out)
+        self._kernel.quintic_at(
+            self.height, min(self.phase(t), self._gait.step_time) - self.offset, out
+        )
 
     def lift(self, foot: Array) -> None:
         """Begin the swing where the foot is (3,), m."""
@@ -137,8 +140,8 @@ class StepReferences:
             if left > 0.015:
                 self._end[:] = self.target[i], 0.0, 0.0
                 self._kernel.quintic(self.swing[:, i], self._end, left, self._c)
-                self._kernel.quintic_at(self._c, min(period, left), self._now)
-                self.swing[:, i] = self._now
+                self._kernel.quintic_at(self._c, min(period, left), self._moved)
+                self.swing[:, i] = self._moved
             else:
                 self.swing[1:, i] = 0.0
         u = min(max((phase - gait.transfer_time) / duration, 0.0), 1.0)
