@@ -8,6 +8,7 @@ import numpy as np
 
 from sealag import __version__
 from sealag.design._project import System
+from sealag.errors import SolverError
 from sealag.margin import DelayMargin, delay_margin
 from sealag.passivity import (
     Certificate,
@@ -242,7 +243,8 @@ def published_bounds(stack: WholeBodyStack, system: System) -> Bounds:
 def _local(
     system: System, motion: Motion, stack: WholeBodyStack, *, instant: int
 ) -> tuple[DelayMargin | None, bool | None]:
-    """Exact local margin at an instant, and whether its potential has a minimum."""
+    """Exact local margin at an instant (None if undecided), and whether its potential has a
+    minimum."""
     F = stack.F_theta[instant]
     if not np.isfinite(F).all():
         return None, None
@@ -254,7 +256,10 @@ def _local(
         F=F,
         feedback=system.feedback,
     )
-    margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries)
+    try:
+        margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries)
+    except SolverError:
+        margin = None
     symmetric = stack.asymmetry[instant] <= ASYMMETRY_TOLERANCE
     potential = symmetric and system.feedback is not Feedback.JOINT
     return margin, frozen.stable if potential else None

@@ -2,6 +2,8 @@
 
 from sealag.report._mcap import McapRecorder, RecordingFile, Signal, read_recording
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page, write_text
+from sealag.report._paper_page import write_paper_page
+from sealag.report._plots import plot_figure_4, plot_walk_bounds
 
 __all__ = [
     "Cell",
@@ -13,7 +15,10 @@ __all__ = [
     "Signal",
     "Table",
     "Text",
+    "plot_figure_4",
+    "plot_walk_bounds",
     "read_recording",
     "render_page",
+    "write_paper_page",
     "write_text",
 ]

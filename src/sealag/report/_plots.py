@@ -1,0 +1,107 @@
+"""Plots as SVG markup for pages."""
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from sealag.paper import Figure4
+from sealag.whole_body import Feedback, StiffnessForm
+
+COLOURS = ("#0b6e99", "#c0561f", "#5b7f2b")
+
+
+@contextmanager
+def _drawing(width: float, height: float) -> Iterator[tuple[Any, Any]]:
+    """A figure and its axes that leave nothing behind; text stays text."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(
+        {"svg.fonttype": "none", "font.size": 12, "axes.spines.top": False,
+         "axes.spines.right": False, "font.family": "sans-serif"}
+    ):  # fmt: skip
+        figure = Figure(figsize=(width, height), layout="constrained")
+        yield figure, figure.subplots()
+
+
+def _svg(figure: Any) -> str:
+    """Markup of a figure that scales with its place on the page."""
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def plot_figure_4(figure: Figure4) -> str:
+    """Draw the largest delay against α.
+
+    Args:
+        figure: the computed figure.
+
+    Returns:
+        SVG markup.
+    """
+    with _drawing(7.2, 4.6) as (drawing, axes):
+        for colour, damping, delay in zip(
+            COLOURS, figure.abduction_damping, figure.delay_s, strict=True
+        ):
+            axes.plot(
+                figure.alpha, delay * 1e3, "-o", ms=3.5, color=colour,
+                label=f"(29), D_θ[0] = {damping:g} Nms/rad",
+            )  # fmt: skip
+        static = _variant(figure, Feedback.STATIC_JOINT)
+        axes.plot(
+            figure.alpha, figure.alpha * static * 1e3, "--", color="#444",
+            label="certified, q̄(θ) fed back, D_θ[0] = 10",
+        )  # fmt: skip
+        axes.set_xlabel("α, factor on the motor damping D_θ")
+        axes.set_ylabel("largest delay over the walk (ms)")
+        axes.set_ylim(bottom=0.0)
+        axes.set_xlim(left=0.0)
+        axes.grid(alpha=0.25)
+        axes.legend(frameon=False, fontsize=10)
+        return _svg(drawing)
+
+
+def _variant(figure: Figure4, feedback: Feedback) -> float:
+    return next(
+        float(v.delay_s.min())
+        for v in figure.certified
+        if v.feedback is feedback and v.form is StiffnessForm.SYMMETRIC
+    )
+
+
+def plot_walk_bounds(figure: Figure4) -> str:
+    """Draw the bound at every instant of the walk for α = 1.
+
+    Args:
+        figure: the computed figure.
+
+    Returns:
+        SVG markup.
+    """
+    with _drawing(7.2, 4.0) as (drawing, axes):
+        pick = np.unique(np.linspace(0, len(figure.time) - 1, 900).astype(int))
+        for colour, damping, delay in zip(
+            COLOURS, figure.abduction_damping, figure.instants_delay_s, strict=True
+        ):
+            label = f"(29), D_θ[0] = {damping:g}"
+            axes.plot(figure.time[pick], delay[pick] * 1e3, color=colour, lw=1.4, label=label)
+        static = next(
+            v.delay_s
+            for v in figure.certified
+            if v.feedback is Feedback.STATIC_JOINT and v.form is StiffnessForm.SYMMETRIC
+        )
+        axes.plot(
+            figure.time[pick], static[pick] * 1e3, "--", color="#444", lw=1.2,
+            label="certified, q̄(θ), D_θ[0] = 10",
+        )  # fmt: skip
+        axes.set_xlabel("time along the planned walk (s)")
+        axes.set_ylabel("largest delay (ms)")
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.25)
+        axes.legend(frameon=False, fontsize=10, ncols=2)
+        return _svg(drawing)
