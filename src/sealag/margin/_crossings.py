@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.margin._loop import Loop, Transfer
-from sealag.margin._sweep import Cluster
+from sealag.margin._sweep import Cluster, slow_limit
 from sealag.typing import Array
 
 _ON_LINE = 1e-5
 _SLOW = 1e-6
 _STEPS = 30
-_ENDLESS = 1e6
+_STATIC = 1e-8
+_APART = 1e-2
 _REACH = 1e-4
 
 
@@ -54,28 +55,29 @@ def crossings_in(transfer: Transfer, bands: list[Cluster]) -> tuple[list[Crossin
     found: list[Crossing] = []
     explained = True
     for band in bands:
+        if _touches_at_zero(transfer, band):
+            continue
         middle = (band.lower + band.upper) / 2.0
         nu = np.linalg.eigvals(transfer.reference * transfer.near(middle)[0])
         starts = nu[_near_line(nu, _ON_LINE)]
-        here = [_refine(transfer, middle, nu=value) for value in starts] if band.lower else []
+        reach = _REACH * middle + 2.0 * (band.upper - band.lower)
+        here = [_refine(transfer, middle, nu=value, reach=reach) for value in starts]
         refined = [crossing for crossing in here if crossing is not None]
-        found += [crossing for crossing in refined if not _static(transfer, crossing)]
-        explained &= (bool(here) and len(refined) == len(here)) or _endless(transfer, band)
+        found += refined
+        explained &= bool(here) and len(refined) == len(here)
     return sorted(found, key=lambda crossing: crossing.delay), explained
 
 
-def _static(transfer: Transfer, crossing: Crossing) -> bool:
-    """Whether a crossing is a contact at zero frequency, which no finite delay reaches."""
-    longest = crossing.delay * transfer.loop.size
-    return longest > (_ENDLESS if crossing.direction == 0 else 100.0 * _ENDLESS)
+def _touches_at_zero(transfer: Transfer, band: Cluster) -> bool:
+    """Whether a band is a contact at zero frequency itself, which no finite delay reaches.
 
-
-def _endless(transfer: Transfer, band: Cluster) -> bool:
-    """Whether a band that reaches down to zero frequency can only mean extremely long delays."""
-    nu = np.linalg.eigvals(transfer.reference * transfer.near(band.upper)[0])
-    z = transfer.reference * (1.0 + 1.0 / nu[_near_line(nu, 1e-2)])
-    angle = np.abs(np.angle(z)).min(initial=math.pi)
-    return bool(angle / band.upper > _ENDLESS / transfer.loop.size)
+    A_0 + z A_1 is then singular for a z ≠ 1 of modulus 1, and the band lies far below every pole.
+    """
+    if band.upper > 1.1 * slow_limit(transfer):
+        return False
+    nu = np.linalg.eigvals(transfer.reference * transfer.near(0.0)[0])
+    z = transfer.reference * (1.0 + 1.0 / nu[_near_line(nu, _STATIC)])
+    return bool(len(z)) and bool((np.abs(np.angle(z)) > _APART).all())
 
 
 def _near_line(nu: Array, tolerance: float) -> Array:
@@ -83,7 +85,7 @@ def _near_line(nu: Array, tolerance: float) -> Array:
     return np.abs(nu.real + 0.5) < tolerance * np.maximum(np.abs(nu) ** 2, np.abs(nu))
 
 
-def _refine(transfer: Transfer, omega: float, *, nu: complex) -> Crossing | None:
+def _refine(transfer: Transfer, omega: float, *, nu: complex, reach: float) -> Crossing | None:
     """Newton's method on Re(z_0 ν(ω)) = −½; where the root only touches, on its slope."""
     start, best = omega, (math.inf, omega, nu, 0j)
     for _ in range(_STEPS):
@@ -94,14 +96,14 @@ def _refine(transfer: Transfer, omega: float, *, nu: complex) -> Crossing | None
         rate = (1j * slope).real
         if abs(miss) < 4e-16 * abs(value) or rate == 0.0:
             break
-        step = float(np.clip(miss / rate, -_REACH * start, _REACH * start))
+        step = float(np.clip(miss / rate, -reach, reach))
         if omega - step == omega:
             break
         omega, nu = omega - step, value - 1j * slope * step
     _, omega, value, slope = best
     if _turn(value, slope) == 0:
         omega, value, slope = _nearest(transfer, omega, nu=value)
-    if abs(omega - start) > _REACH * start or not _near_line(np.array([value]), _ON_LINE)[0]:
+    if abs(omega - start) > reach or not _near_line(np.array([value]), _ON_LINE)[0]:
         return None
     return _crossing(transfer, omega, value=value, slope=slope)
 
@@ -124,9 +126,10 @@ def _nearest(transfer: Transfer, omega: float, *, nu: complex) -> tuple[float, c
 
 
 def _turn(value: complex, slope: complex) -> int:
-    """Sign of Re(dλ/dd), the same for every k in d = (φ + 2πk)/ω: that of Re(dν/dλ · j)/…
+    """Sign of Re(dλ/dd), which is the same for every k in d = (φ + 2πk)/ω.
 
-    With ν (z − z_0) = 1 and z = e^{-λd}: at fixed ω the root moves against Re(j dν/dλ).
+    From ν (z − z_0) = 1 and z = e^{-λd}, with ν here z_0 ν, it is that of
+    Im((dν/dλ) / (ν (ν + 1))).
     """
     rise = slope / (value * (value + 1.0)) * -1j
     if abs(rise.real) < _SLOW * abs(rise):
@@ -150,7 +153,7 @@ def _crossing(transfer: Transfer, omega: float, *, value: complex, slope: comple
     z_0 = transfer.reference
     z = z_0 * (1.0 + 1.0 / value)
     angle = -math.atan2(z.imag, z.real) % (2.0 * math.pi)
-    delay = angle / omega
+    delay, omega = float(angle / omega), float(omega)
     mode, residual = mode_at(transfer.loop, omega, delay)
     return Crossing(
         delay=delay, frequency=omega, direction=_turn(value, slope), mode=mode, residual=residual

@@ -75,7 +75,8 @@ def prepare(A_0: ArrayLike, A_1: ArrayLike, *, symmetries: ArrayLike | None) -> 
         The loop that is left; its size is 0 where nothing is left.
 
     Raises:
-        InputError: a matrix cannot be used, or a symmetry is none.
+        InputError: a matrix cannot be used.
+        SolverError: a symmetry is none.
     """
     from scipy.linalg import matrix_balance
 
@@ -116,8 +117,9 @@ def _neutral(A_0: Array, A_1: Array, *, symmetries: ArrayLike | None) -> tuple[i
     stacked = np.vstack([A_0, A_1])
     lost = np.abs(stacked @ basis).max()
     if lost > _STRUCTURE * np.abs(stacked).max():
-        raise InputError(
-            f"A column of symmetries is not neutral: A_0 v or A_1 v is {lost:.2g} instead of 0."
+        raise SolverError(
+            "A column v of symmetries is moved by the dynamics, so it is none: A_0 v or A_1 v is "
+            f"{lost:.2g} instead of 0."
         )
     newest = basis
     inverse = np.linalg.pinv(stacked, rcond=1e-12)
@@ -150,14 +152,25 @@ def roots_without_delay(loop: Loop) -> tuple[int, bool]:
     return int(outside.sum()), bool((outside & (values.real <= error)).any())
 
 
+def has_zero_root(loop: Loop) -> bool:
+    """Tell whether A_0 + A_1 is singular to rounding: a root at zero whatever the delay.
+
+    Args:
+        loop: the loop.
+    """
+    values = np.linalg.svd(loop.A_0 + loop.A_1, compute_uv=False)
+    return bool(values[-1] <= 64.0 * len(values) * EPS * loop.size)
+
+
 def _eigenvalues_with_error(A: Array) -> tuple[Array, Array]:
     from scipy.linalg import eig
 
-    values, left, right = eig(A, left=True, right=True)
+    values, left, right = eig(A, left=True, right=True)[:3]  # pyright: ignore
     overlap = np.abs(np.sum(left.conj() * right, axis=0))
     backward = 4.0 * len(A) * EPS * float(np.linalg.norm(A, 2))
     simple = backward / np.maximum(overlap, EPS)
-    return values, np.minimum(simple, np.sqrt(backward * np.linalg.norm(A, 2)))
+    norm = float(np.linalg.norm(A, 2))
+    return values, np.minimum(simple, np.cbrt(backward * norm**2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sealag.errors import InputError, SolverError
 from sealag.margin._crossings import Crossing, crossings_in
-from sealag.margin._loop import Loop, prepare, roots_without_delay, transfer_of
+from sealag.margin._loop import Loop, has_zero_root, prepare, roots_without_delay, transfer_of
 from sealag.margin._roots import loop_roots
 from sealag.margin._sweep import candidate_bands
 from sealag.typing import Array, ArrayLike
@@ -17,8 +18,7 @@ _RESIDUAL = 1e-9
 _METHOD = "frequency sweep with excluded intervals, Newton"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Interval:
+class Interval(NamedTuple):
     """A range of constant delays with one number of unstable roots.
 
     Attributes:
@@ -48,7 +48,8 @@ class DelayMargin:
         neutral: structural zero roots taken out: the symmetries and their momentum chains.
         crossings: every crossing with its shortest delay and direction, by delay.
         intervals: ranges of delay with their unstable roots, when asked for; else empty.
-        guaranteed: whether every frequency outside the crossings was excluded (up to rounding).
+        guaranteed: whether every frequency outside the crossings was excluded (up to rounding);
+            False where a root lies at zero whatever the delay and hides the slowest ones.
         residual: relative residual of the characteristic equation at the first crossing.
         method: how it was found.
     """
@@ -73,14 +74,14 @@ def delay_margin(
     symmetries: ArrayLike | None = None,
     intervals: bool = False,
     horizon: float | None = None,
-    check: bool = False,
+    confirm: bool = False,
 ) -> DelayMargin:
     """Exact margin of ẋ = A_0 x + A_1 x(t − d) for constant d (THEORY section 7).
 
     A root jω with z = e^{-jωd} solves det(jω − A_0 − z A_1) = 0. All frequencies but narrow bands
     are excluded by eigenvalue enclosures, the bands are refined by Newton's method, and a band
-    that nothing explains raises. Necessary and sufficient for the frozen loop. Roots that touch
-    the axis at zero frequency, and delays beyond 1e8/(‖A_0‖ + ‖A_1‖), count as never.
+    that nothing explains raises. Necessary and sufficient for the frozen loop. A root
+    that touches the axis only at zero frequency does so after an infinite delay: never.
 
     Args:
         A_0: (n, n) undelayed part, 1/s.
@@ -88,18 +89,18 @@ def delay_margin(
         symmetries: (n, s) columns v with A_0 v = 0 and A_1 v = 0; they and the chains
             A_0 y = v, A_1 y = 0 that belong to them are divided out before anything is computed.
         intervals: whether to list the ranges of delay with their numbers of unstable roots.
-        horizon: longest delay listed in intervals, s; None for twenty periods of the slowest
-            crossing.
-        check: whether to count the roots at zero delay and on both sides of the margin by an
+        horizon: longest delay listed in intervals, s, which asks for them too; None for twenty
+            periods of the slowest crossing.
+        confirm: whether to count the roots at zero delay and on both sides of the margin by an
             independent method (Chebyshev collocation) too.
 
     Returns:
         The margin.
 
     Raises:
-        InputError: matrices do not fit or are not finite, or a symmetry is none.
-        SolverError: a band of frequencies could be neither excluded nor explained, or a check
-            contradicts the answer.
+        InputError: matrices do not fit or are not finite.
+        SolverError: a symmetry is none, a band of frequencies could be neither excluded nor
+            explained, or a check contradicts the answer.
     """
     if horizon is not None and not (math.isfinite(horizon) and horizon > 0.0):
         raise InputError(f"horizon is {horizon:g} s; a positive time is needed.")
@@ -115,23 +116,24 @@ def delay_margin(
         if not on_axis:
             raise
         return _answer(loop, (), unstable=unstable, known=False)
-    found, explained = crossings_in(transfer, candidate_bands(transfer))
+    zero_root = on_axis and has_zero_root(loop)
+    found, explained = crossings_in(transfer, candidate_bands(transfer, zero_root=zero_root))
     if not explained:
         raise SolverError(
             "A band of frequencies could be neither excluded nor refined to a crossing; the "
             "margin is not known."
         )
-    answer = _answer(loop, tuple(found), unstable=unstable, known=True)
+    ranges = _intervals(found, unstable=unstable, horizon=horizon) if intervals or horizon else ()
+    answer = _answer(
+        loop, tuple(found), unstable=unstable, known=True, intervals=ranges, zero_root=zero_root
+    )
     if answer.residual > _RESIDUAL:
         raise SolverError(
             f"The characteristic equation has a relative residual of {answer.residual:.1e} at "
             "the crossing; the margin is not known."
         )
-    if check:
+    if confirm:
         _check(loop, answer)
-    if intervals:
-        ranges = _intervals(found, unstable=unstable, horizon=horizon)
-        answer = _answer(loop, tuple(found), unstable=unstable, known=True, intervals=ranges)
     return answer
 
 
@@ -174,6 +176,7 @@ def _answer(
     unstable: int,
     known: bool,
     intervals: tuple[Interval, ...] = (),
+    zero_root: bool = False,
 ) -> DelayMargin:
     worse = [(delay, item) for item in crossings if (delay := _next(item)) is not None]
     first, crossing = min(worse, key=lambda pair: pair[0], default=(math.inf, None))
@@ -186,7 +189,7 @@ def _answer(
         neutral=loop.neutral,
         crossings=crossings,
         intervals=intervals,
-        guaranteed=known,
+        guaranteed=known and not zero_root,
         residual=crossing.residual if crossing else 0.0,
         method=_METHOD if known else "undamped motion that the delay does not reach",
     )

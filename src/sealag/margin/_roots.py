@@ -14,8 +14,8 @@ _MOST_NODES = 120
 def rightmost_roots(
     A_0: ArrayLike,
     A_1: ArrayLike,
-    *,
     delay: float,
+    *,
     count: int = 1,
     nodes: int = 24,
     symmetries: ArrayLike | None = None,

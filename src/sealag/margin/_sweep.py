@@ -15,8 +15,10 @@ from sealag.margin._loop import Transfer
 from sealag.typing import Array, BoolArray, IntArray
 
 _NARROW = 2e-9
-_FLOOR = 1e-7
-_SLOW = 1e-11
+_FLOOR = 1e-4
+_SLOW = 1e-4
+_TINY = 1e-14
+_HIDDEN = 100.0
 _WORST_VECTORS = 1e10
 _MOST_INTERVALS = 400_000
 _CHUNK = 4096
@@ -35,11 +37,23 @@ class Cluster:
     upper: float
 
 
-def candidate_bands(transfer: Transfer) -> list[Cluster]:
+def slow_limit(transfer: Transfer) -> float:
+    """Frequency far below the slowest pole, rad/s: what happens there is a contact at zero.
+
+    Args:
+        transfer: G about its reference.
+    """
+    slowest = float(np.abs(transfer.poles).min())
+    return max(_FLOOR * slowest, _TINY * transfer.loop.size)
+
+
+def candidate_bands(transfer: Transfer, *, zero_root: bool) -> list[Cluster]:
     """Find the narrow bands outside which no delay puts a root on the imaginary axis.
 
     Args:
         transfer: G about its reference.
+        zero_root: whether a root lies at zero whatever the delay; slow frequencies are then left
+            out, because it hides what crosses there.
 
     Returns:
         Disjoint bands in increasing frequency; the first may touch zero.
@@ -49,9 +63,9 @@ def candidate_bands(transfer: Transfer) -> list[Cluster]:
     """
     top = 1.01 * transfer.loop.size
     marks = np.abs(transfer.poles.imag)
-    edges = np.unique(
-        np.concatenate([[0.0, top], np.geomspace(_FLOOR * top, top, 80), marks[marks < top]])
-    )
+    floor = slow_limit(transfer)
+    edges = np.concatenate([[0.0], np.geomspace(floor, top, 80), marks[marks < top]])
+    edges = np.unique(edges[edges >= _HIDDEN * floor] if zero_root else edges)
     lower, upper = edges[:-1], edges[1:]
     narrow: list[tuple[float, float]] = []
     count = 0
@@ -69,8 +83,8 @@ def candidate_bands(transfer: Transfer) -> list[Cluster]:
             ]
         )
         lower, upper = lower[open_], upper[open_]
-        slow = upper <= _FLOOR * top
-        final = upper - lower <= np.where(slow, _SLOW * top, _NARROW * upper)
+        slow = upper <= floor
+        final = upper - lower <= np.where(slow, _SLOW * floor, _NARROW * upper)
         narrow += list(zip(lower[final], upper[final], strict=True))
         lower, upper = lower[~final], upper[~final]
         middle = (lower + upper) / 2.0
