@@ -58,8 +58,8 @@ def _solve(M, right, J, C, target, closed, mu):
     x, force, yielding = np.zeros(nv), np.zeros((count, 3)), np.zeros(count)
     none, foot_of = np.zeros((0, 2)), np.zeros(count, np.int64)
     assert contact.solve(
-        L, rows, free, target, closed, mu, yielding, foot_of, none, np.zeros((0, nv)),
-        np.zeros(0), x, force,
+        L, rows, free, target, closed, mu, np.full(count, 1e-11), yielding, foot_of, none,
+        np.zeros((0, nv)), np.zeros(0), x, force,
     )  # fmt: skip
     return x, force, yielding
 
@@ -154,7 +154,7 @@ def test_settle_opens_what_pulls():
     closed, mask = np.ones(2, np.int64), np.ones(2, np.int64)
     x, force = np.zeros(2), np.zeros((2, 3))
     status = contact.settle(
-        L, rows, free, np.zeros((2, 3)), mask, closed, np.zeros(2), np.zeros(2),
+        L, rows, free, np.zeros((2, 3)), mask, closed, np.zeros(2), np.full(2, 1e-11), np.zeros(2),
         np.zeros(2, np.int64), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), 1e-9, x, force,
     )  # fmt: skip
     assert status == 0

@@ -17,7 +17,6 @@ from numba import njit
 
 from sealag.kernels.rigid import _backward, _forward, cholesky
 
-_RIDGE = 1e-11  # relative diagonal that shares force between redundant points
 _CONE = 1e-10  # relative accuracy of the friction cone
 _ITERATIONS = 60
 
@@ -96,7 +95,7 @@ def project(L, J, C, rows):
 
 
 @njit(cache=True)
-def _assemble(rows, free, target, closed, mu, owner, G, b):
+def _assemble(rows, free, target, closed, mu, ridge, owner, G, b):
     """Write the contact equations G f = b of all closed points; return their number of rows."""
     size = 0
     for i in range(closed.size):
@@ -121,7 +120,7 @@ def _assemble(rows, free, target, closed, mu, owner, G, b):
             G[k, r] = s
         largest = max(largest, G[r, r])
     for r in range(size):
-        G[r, r] += _RIDGE * largest
+        G[r, r] += ridge[owner[r, 0]] * largest
     return size
 
 
@@ -231,12 +230,14 @@ def _twist_torque(force, closed, foot_of, torsion, spin, torque):
 
 @njit(cache=True)
 def solve(
-    L, rows, free, target, closed, mu, yielding, foot_of, torsion, twist_rows, spin, x, force
-):
+    L, rows, free, target, closed, mu, ridge, yielding, foot_of, torsion, twist_rows, spin,
+    x, force,
+):  # fmt: skip
     """Meet the contact conditions of the closed points.
 
-    ``free`` (nv,) is L⁻¹ times the unconstrained right side, ``yielding`` (P,) a first guess that
-    is improved, ``torsion`` (F, 2) friction torque about the normal: per rate, and per normal
+    ``free`` (nv,) is L⁻¹ times the unconstrained right side, ``ridge`` (P,) the relative compliance
+    that shares force between redundant points, ``yielding`` (P,) a first guess that is improved,
+    ``torsion`` (F, 2) friction torque about the normal: per rate, and per normal
     force. Writes x (nv,) and force (P, 3); returns False if there is no solution.
     """
     count = 3 * closed.size
@@ -252,7 +253,7 @@ def solve(
             if torque[k] != 0.0:
                 for c in range(x.size):
                     x[c] += twist_rows[k, c] * torque[k]
-        size = _assemble(rows, x, target, closed, mu, owner, G, b)
+        size = _assemble(rows, x, target, closed, mu, ridge, owner, G, b)
         force[:] = 0.0
         if size > 0 and not _friction(G, b, owner, size, mu, yielding, f[:size]):
             return False
@@ -269,8 +270,8 @@ def solve(
 
 @njit(cache=True)
 def settle(
-    L, rows, free, target, touching, closed, mu, yielding, foot_of, torsion, twist_rows, spin,
-    tolerance, x, force,
+    L, rows, free, target, touching, closed, mu, ridge, yielding, foot_of, torsion, twist_rows,
+    spin, tolerance, x, force,
 ):  # fmt: skip
     """Find which touching points are closed, so that none pulls and none sinks in.
 
@@ -281,7 +282,7 @@ def settle(
     count = closed.size
     for _ in range(8 * count + 8):
         if not solve(
-            L, rows, free, target, closed, mu, yielding, foot_of, torsion, twist_rows, spin,
+            L, rows, free, target, closed, mu, ridge, yielding, foot_of, torsion, twist_rows, spin,
             x, force,
         ):  # fmt: skip
             return 2
@@ -348,15 +349,15 @@ def evaluate(
 
     Groups of arrays, all preallocated: ``frames`` (J, R, p, drift) of the feet and loaded frames,
     ``joint`` link positions (n,), ``motor`` (n, 2) angle and speed, ``spring`` (K, D_s),
-    ``shape`` (frame_of, offset), ``ground`` (C, anchor, mu), ``rates`` (stabilisation gain, stop
-    time), ``state`` (closed, yielding), ``load`` forces (L, 3) on the points after the contact
-    points, ``torsion`` as in ``solve``. Writes ``instant``: tau, acceleration, force, position,
-    velocity, target, right, L, rows, power, J, drift, twist_rows, spin; power: normal, tangential,
-    torsional, load, and kinetic energy. Returns False if the equations have no solution.
+    ``shape`` (frame_of, offset), ``ground`` (C, anchor, mu, ridge), ``rates`` (stabilisation
+    gain, stop time), ``state`` (closed, yielding), ``load`` forces (L, 3) on the points after the
+    contact points, ``torsion`` as in ``solve``. Writes ``instant``: tau, acceleration, force,
+    position, velocity, target, right, L, rows, power, J, drift, twist_rows, spin; power: normal,
+    tangential, torsional, load, and kinetic energy. Returns False if there is no solution.
     """
     J_frame, R, p, drift_frame = frames
     frame_of, offset = shape
-    C, anchor, mu = ground
+    C, anchor, mu, ridge = ground
     closed, yielding = state
     tau, acceleration, force, position, velocity, target, right, L, rows = instant[:9]
     power, J, drift, twist_rows, spin = instant[9:]
@@ -387,8 +388,8 @@ def evaluate(
     free = right.copy()
     _forward(L, free)
     solved = solve(
-        L, rows, free, target, closed, mu, yielding, frame_of[:count], torsion, twist_rows, spin,
-        acceleration, force,
+        L, rows, free, target, closed, mu, ridge, yielding, frame_of[:count], torsion, twist_rows,
+        spin, acceleration, force,
     )  # fmt: skip
     _contact_power(C, velocity, force, closed, power)
     torque = np.zeros(spin.size)
@@ -405,7 +406,7 @@ def warm() -> None:
     frames = (np.zeros((1, 6, nv)), np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, 6)))
     frames[0][0, :6, :6] = np.eye(6)
     shape = (np.zeros(1, np.int64), np.zeros((1, 3)))
-    ground = (np.eye(3)[None], np.zeros((1, 3)), np.ones(1))
+    ground = (np.eye(3)[None], np.zeros((1, 3)), np.ones(1), np.zeros(1))
     state, rates = (np.ones(1, np.int64), np.zeros(1)), (50.0, 1e-3)
     torsion, one = np.zeros((1, 2)), np.zeros((1, 3))
     instant = (
@@ -423,7 +424,7 @@ def warm() -> None:
     project(L, instant[10], ground[0], rows)
     demand(ground[0], one, one, one, one, 50.0, 1e-3, one.copy())
     settle(
-        L, rows, v, one, closed, closed, ground[2], state[1], shape[0], torsion, instant[12],
-        instant[13], 1e-9, v.copy(), one.copy(),
+        L, rows, v, one, closed, closed, ground[2], ground[3], state[1], shape[0], torsion,
+        instant[12], instant[13], 1e-9, v.copy(), one.copy(),
     )  # fmt: skip
     margins(ground[0], one, one, np.zeros(1), closed, 1.0, np.zeros(1))

@@ -14,6 +14,8 @@ from sealag.typing import Array, IntArray
 
 MARGIN = 1e-9  # m and body weights: a contact this close to changing is at its change
 _NEAR = 1e-7  # m, m/s: points this near take part in the same change
+_RISEN = 2e-5  # m: an opened point this high has left the ground
+_POINT, _SOLE = 1e-11, 1e-6  # relative compliance of points that do, or do not, stand alone
 _BURIED = 1e-4  # m: how deep a foot may begin inside the ground
 
 
@@ -59,7 +61,8 @@ class Contacts:
         self.C = np.tile(np.eye(3), (self.count, 1, 1))
         self.anchor = np.zeros((self.count, 3))
         self.mu = np.array([foot.friction for foot in owners], dtype=float)
-        self.ground_arrays = (self.C, self.anchor, self.mu)
+        self.ridge = np.where(np.bincount(self.foot_of)[self.foot_of] > 1, _SOLE, _POINT)
+        self.ground_arrays = (self.C, self.anchor, self.mu, self.ridge)
         self.closed = np.zeros(self.count, np.int64)
         self.yielding = np.zeros(self.count)
         self.state = (self.closed, self.yielding)
@@ -68,12 +71,16 @@ class Contacts:
             self.torsion[f] = foot.torsional_damping, foot.torsional_radius
         self._weight = robot.mass * 9.81
         self._radius = np.array([foot.radius for foot in owners], dtype=float)
+        # How far below the ground a point may be that opened but has not risen: several points of
+        # one sole share its load, and those without any must not strike again and again.
+        self._floor = np.zeros(self.count)
         self._margins, self._before = np.zeros(self.count), np.zeros(self.count)
 
     def open_all(self) -> None:
         """Open every contact."""
         self.closed[:] = 0
         self.yielding[:] = 0.0
+        self._floor[:] = 0.0
 
     def remember(self) -> None:
         """Keep the sliding state of a step's beginning."""
@@ -96,7 +103,13 @@ class Contacts:
     def measure_gaps(self, at: Instant) -> None:
         """Measure the gaps of all open points."""
         for point in range(self.count):
-            at.gap[point] = np.inf if self.closed[point] else self.height(at, point)
+            if self.closed[point]:
+                at.gap[point] = np.inf
+                continue
+            height = self.height(at, point)
+            if height > _RISEN:
+                self._floor[point] = 0.0
+            at.gap[point] = height - self._floor[point]
 
     def refuse_buried(self, at: Instant) -> None:
         """Raise InputError if a foot begins inside the ground."""
@@ -183,8 +196,10 @@ class Contacts:
         x: Array,
         force: Array,
     ) -> None:
+        before = self.closed.copy()
         status = self._kernel.settle(
-            at.L, at.rows, free, target, mask, self.closed, self.mu, yielding, self.foot_of,
+            at.L, at.rows, free, target, mask, self.closed, self.mu, self.ridge, yielding,
+            self.foot_of,
             self.torsion, at.twist_rows, spin, 1e-9 * self._weight, x, force,
         )  # fmt: skip
         if status:
@@ -193,3 +208,6 @@ class Contacts:
                 Outcome.CONTACT_UNSOLVABLE,
                 f"no contact forces satisfy unilateral contact and friction at {touching}",
             )
+        for point in np.flatnonzero(before > self.closed).tolist():
+            if self.ridge[point] == _SOLE:
+                self._floor[point] = min(self.height(at, point), 0.0) - 0.5 * _RISEN

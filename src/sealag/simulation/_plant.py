@@ -23,6 +23,7 @@ from sealag.simulation._outcome import EventKind, Outcome, PlantStop
 from sealag.typing import Array, IntArray
 
 _EVENTS_PER_STEP = 60
+_STABLE = 2.0  # swing of a link on its spring in a step, rad; Runge-Kutta is stable to 2.8
 _LOCATE = 40
 
 
@@ -132,7 +133,8 @@ class Plant:
             theta_dot: Motor speeds (n,), rad/s; default the joint rates.
 
         Raises:
-            InputError: A foot begins inside the ground, or no contact forces can hold the state.
+            InputError: A foot begins inside the ground, no contact forces can hold the state, or
+                the step is too long for a light link on a stiff spring.
         """
         now, n = self._now, self.robot.n
         now.q[:], now.v[:] = q, v
@@ -143,6 +145,7 @@ class Plant:
         self.events.clear()
         self.contacts.open_all()
         self._evaluate(now)
+        self._refuse_stiffness(now.M)
         self.contacts.refuse_buried(now)
         self.contacts.measure_gaps(now)
         try:
@@ -150,6 +153,19 @@ class Plant:
         except PlantStop as stop:
             raise InputError(f"the run cannot begin: {stop.message}") from None
         self.ledger.begin(now)
+
+    def _refuse_stiffness(self, M: Array) -> None:
+        n = self.robot.n
+        root = np.sqrt(self._spring[0])
+        mobility = np.linalg.inv(M)[-n:, -n:]
+        squares, modes = np.linalg.eigh(root[:, None] * mobility * root)
+        fastest = float(np.sqrt(squares[-1]))
+        if fastest * self.step_length > _STABLE:
+            joint = self.robot.joints[int(np.abs(modes[:, -1]).argmax())]
+            raise InputError(
+                f"the physics step {self.step_length:g} s is too long: the link of {joint} swings "
+                f"on its spring at {fastest:.0f} rad/s; use at most {0.5 * _STABLE / fastest:.1g} s"
+            )
 
     @property
     def q(self) -> Array:
