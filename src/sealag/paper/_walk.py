@@ -1,0 +1,286 @@
+"""Hume walks: one closed-loop walk over rough ground, and whether its gait is a gait."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sealag.delay import Delays, DelaySignal
+from sealag.design import System
+from sealag.locomotion import (
+    Terrain,
+    WalkingController,
+    WalkingGait,
+    WalkingOptions,
+    paper_terrain,
+    walking_start,
+)
+from sealag.paper._walk_errors import NoisySensors, SensorNoise, wrong_robot, wrong_springs
+from sealag.robot import Contact, ContactKind, Robot
+from sealag.simulation import (
+    Clock,
+    EventKind,
+    Foot,
+    Network,
+    Outcome,
+    Push,
+    Run,
+    Scene,
+    closed_loop,
+)
+from sealag.typing import Array
+
+FEET = ("left_foot", "right_foot")
+SPEED_TOLERANCE = 0.20
+WIDTH_TOLERANCE = 0.25
+SETTLING = 2  # steps after which the gait counts
+_SIDE = (1.0, -1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scaled:
+    """A delay times a factor.
+
+    Attributes:
+        signal: The delay.
+        factor: The factor, >= 0.
+    """
+
+    signal: DelaySignal
+    factor: float
+
+    @property
+    def upper_bound(self) -> float:
+        """Largest delay, s."""
+        return self.factor * self.signal.upper_bound
+
+    @property
+    def mean(self) -> float:
+        """Mean delay, s."""
+        return self.factor * self.signal.mean
+
+    def at(self, t: float | Array) -> float | Array:
+        """Return the delay at ``t`` (s)."""
+        return self.factor * self.signal.at(t)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkCase:
+    """One walk to be simulated; the defaults are the bundled project and the paper's delays.
+
+    Attributes:
+        terrain: The ground.
+        gait: The plan.
+        options: Means of the controller.
+        steps: How many steps the walk shall have.
+        spring_stiffness: K of all joints, Nm/rad; None takes the project's.
+        damping_scale: α, factor on the project's D_θ.
+        inertia_shaping: β; None takes the project's.
+        delay_scale: Factor on the project's delays.
+        friction: Coulomb coefficient of the feet, an assumption.
+        noise: Sensor errors, None for ideal sensors.
+        model_error: Largest relative error of the plant's masses, centres of mass, inertias and
+            springs against what the controller believes.
+        pushes: Disturbing forces.
+        seed: Of noise and model errors.
+        physics: Step of the plant, s.
+        log_period: Between logged instants, s.
+    """
+
+    terrain: Terrain = field(default_factory=paper_terrain)
+    gait: WalkingGait = field(default_factory=WalkingGait)
+    options: WalkingOptions = field(default_factory=WalkingOptions)
+    steps: int = 7
+    spring_stiffness: float | None = None
+    damping_scale: float = 1.0
+    inertia_shaping: float | None = None
+    delay_scale: float = 1.0
+    friction: float = 0.8
+    noise: SensorNoise | None = None
+    model_error: float = 0.0
+    pushes: Sequence[Push] = ()
+    seed: int = 0
+    physics: float = 1e-3
+    log_period: float = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Walk:
+    """A simulated walk and its gait.
+
+    Attributes:
+        case: What was asked for.
+        run: The simulation.
+        touchdown: (S + 1,) instants of the footholds, the first is the start, s.
+        foot: (S + 1,) 0 left, 1 right.
+        place: (S + 1, 3) footholds, m.
+        apex_time: (A,) instants at which the CoM passes over the stance foot, s.
+        apex_speed: (A,) forward speed of the CoM then, m/s.
+        apex_step: (A,) which foothold was stood on.
+        step_width: (S,) distance of successive footholds across, positive when not crossed, m.
+        com: (N, 3) CoM at the logged instants, m.
+    """
+
+    case: WalkCase
+    run: Run
+    touchdown: Array
+    foot: Array
+    place: Array
+    apex_time: Array
+    apex_speed: Array
+    apex_step: Array
+    step_width: Array
+    com: Array
+
+    @property
+    def steps(self) -> int:
+        """Number of steps taken."""
+        return len(self.step_width)
+
+    @property
+    def walked(self) -> bool:
+        """Whether all steps were taken without a fall."""
+        return self.run.outcome == Outcome.COMPLETED and self.steps >= self.case.steps
+
+    @property
+    def speed_deviation(self) -> float:
+        """Largest relative deviation of the apex speeds from the plan after the second step."""
+        late = self.apex_speed[self.apex_step >= SETTLING]
+        return float(np.abs(late / self.case.gait.apex_speed - 1.0).max(initial=0.0))
+
+    @property
+    def width_deviation(self) -> float:
+        """Largest relative deviation of the step widths from the plan after the second step."""
+        late = self.step_width[SETTLING:]
+        return float(np.abs(late / self.case.gait.step_width - 1.0).max(initial=0.0))
+
+    @property
+    def is_gait(self) -> bool:
+        """Whether it walked, with apex speeds within 20 % and step widths within 25 %."""
+        good = self.speed_deviation <= SPEED_TOLERANCE and self.width_deviation <= WIDTH_TOLERANCE
+        return self.walked and good
+
+    @property
+    def cause(self) -> str:
+        """How it ended, in words."""
+        if self.walked:
+            return "walked"
+        if self.run.outcome == Outcome.COMPLETED:
+            return f"only {self.steps} steps in time"
+        return f"{self.run.outcome.value} after {self.steps} steps: {self.run.message}"
+
+
+def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
+    """Simulate a walk in closed loop: springs, delays, unilateral contact, nothing else.
+
+    Args:
+        system: The project: robot, actuators and delays.
+        case: What to walk.
+    """
+    case = case or WalkCase()
+    believed, robot = system.actuators, system.robot
+    believed = replace(believed, motor_damping=case.damping_scale * believed.motor_damping)
+    if case.spring_stiffness is not None:
+        stiffness = np.full(believed.n, case.spring_stiffness)
+        believed = replace(believed, spring_stiffness=stiffness)
+    if case.inertia_shaping is not None:
+        shaped = case.inertia_shaping * believed.rotor_inertia
+        believed = replace(believed, shaped_inertia=shaped)
+    controller = WalkingController(
+        robot, believed, case.terrain, feet=FEET, gait=case.gait, options=case.options
+    )
+    q, v = walking_start(robot, case.terrain, gait=case.gait, feet=FEET)
+    theta = controller.motor_start(q, v)
+    plant, springs = robot, believed
+    if case.model_error > 0.0:
+        plant = wrong_robot(robot, error=case.model_error, seed=case.seed)
+        springs = wrong_springs(believed, error=case.model_error, seed=case.seed)
+    seen = controller
+    if case.noise is not None:
+        seen = NoisySensors(controller, robot, noise=case.noise, seed=case.seed)
+    run = closed_loop(
+        plant,
+        springs,
+        seen,
+        q=q,
+        v=v,
+        theta=theta,
+        theta_dot=v[-robot.n :],
+        duration=round((case.steps + 0.5) * case.gait.step_time, 3),
+        network=_network(system.delays, case.delay_scale),
+        clock=Clock(physics=case.physics, central=1e-3),
+        scene=_scene(case),
+        seed=case.seed,
+        log_period=case.log_period,
+    )
+    return measure_walk(plant, run, case)
+
+
+def _network(delays: Delays, factor: float) -> Network:
+    return Network.from_delays(
+        replace(
+            delays,
+            central=Scaled(signal=delays.central, factor=factor),
+            embedded=Scaled(signal=delays.embedded, factor=factor),
+        )
+    )
+
+
+def _scene(case: WalkCase) -> Scene:
+    feet = [
+        Foot(
+            contact=Contact(frame=frame, kind=ContactKind.POINT),
+            friction=case.friction,
+            radius=case.gait.foot_radius,
+        )
+        for frame in FEET
+    ]
+    return Scene(feet=feet, ground=case.terrain, pushes=case.pushes)
+
+
+def measure_walk(robot: Robot, run: Run, case: WalkCase) -> Walk:
+    """Find footholds, apexes and step widths in a run.
+
+    A foothold is where the foot that was in the air touches down; the apex is where the CoM
+    passes over the foot that touched down last.
+
+    Args:
+        robot: The robot that walked.
+        run: The simulation.
+        case: What was asked for.
+    """
+    at = robot.workspace()
+    count = len(run.time)
+    com, speed, feet = np.zeros((count, 3)), np.zeros(count), np.zeros((count, 2, 3))
+    for i in range(count):
+        at.update(run.q[i], run.v[i])
+        com[i], speed[i] = at.com, at.com_velocity[0]
+        for f, frame in enumerate(FEET):
+            feet[i, f] = at.frame_placement(frame)[1]
+    first = int(run.contact_mode[0].argmax())
+    times, foot = [0.0], [first]
+    for event in run.events:
+        f = FEET.index(event.foot)
+        late = event.time - times[-1] > 0.3 * case.gait.step_time
+        if event.kind == EventKind.TOUCHDOWN and f != foot[-1] and late:
+            times.append(event.time)
+            foot.append(f)
+    index = np.minimum(np.searchsorted(run.time, times), count - 1)
+    place = feet[index, foot]
+    side = np.array([_SIDE[f] for f in foot[1:]])
+    stood = np.searchsorted(np.array(times), run.time, side="right") - 1
+    ahead = com[:, 0] - place[stood, 0]
+    same = stood[1:] == stood[:-1]
+    apex = np.flatnonzero(same & (ahead[:-1] <= 0.0) & (ahead[1:] > 0.0))
+    return Walk(
+        case=case,
+        run=run,
+        touchdown=np.array(times),
+        foot=np.array(foot),
+        place=place,
+        apex_time=run.time[apex],
+        apex_speed=speed[apex],
+        apex_step=stood[apex],
+        step_width=side * np.diff(place[:, 1]),
+        com=com,
+    )

@@ -1,0 +1,203 @@
+"""Success tables of the walk: terrains, gains, delays, and every means left out once."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sealag.design import System, load
+from sealag.locomotion import Prediction, Terrain, WalkingOptions, rough_terrain
+from sealag.paper._walk import Walk, WalkCase, simulate_walk
+from sealag.paper._walk_errors import SensorNoise
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkRow:
+    """One row of a success table.
+
+    Attributes:
+        name: What was varied.
+        terrains: Number of walks.
+        walked: How many took all steps without a fall.
+        gaits: How many of them were gaits: apex speeds within 20 %, widths within 25 %.
+        apex_speed: Mean of the apex speeds after the second step, m/s; NaN if there is none.
+        step_width: Mean of the step widths after the second step, m; NaN if there is none.
+        speed_deviation: Largest relative deviation of apex speeds among walks that did not fall.
+        width_deviation: Largest relative deviation of step widths among these.
+        mean_steps: Mean number of steps taken.
+        causes: How the walks that failed ended.
+    """
+
+    name: str
+    terrains: int
+    walked: int
+    gaits: int
+    apex_speed: float
+    step_width: float
+    speed_deviation: float
+    width_deviation: float
+    mean_steps: float
+    causes: tuple[str, ...]
+
+    @classmethod
+    def of(cls, name: str, walks: Sequence[Walk]) -> "WalkRow":
+        """Summarise walks.
+
+        Args:
+            name: What was varied.
+            walks: The walks.
+        """
+        upright = [walk for walk in walks if walk.walked]
+        speeds = [v for w in walks for v in w.apex_speed[w.apex_step >= 2].tolist()]
+        widths = [v for w in walks for v in w.step_width[2:].tolist()]
+        return cls(
+            name=name,
+            terrains=len(walks),
+            walked=len(upright),
+            gaits=sum(walk.is_gait for walk in walks),
+            apex_speed=float(np.mean(speeds)) if speeds else float("nan"),
+            step_width=float(np.mean(widths)) if widths else float("nan"),
+            speed_deviation=max((walk.speed_deviation for walk in upright), default=float("nan")),
+            width_deviation=max((walk.width_deviation for walk in upright), default=float("nan")),
+            mean_steps=float(np.mean([walk.steps for walk in walks])),
+            causes=tuple(walk.cause for walk in walks if not walk.walked),
+        )
+
+
+def walk_success(
+    cases: Mapping[str, WalkCase],
+    terrains: Sequence[Terrain],
+    *,
+    project: str = "bundled:hume",
+    jobs: int = 1,
+) -> tuple[WalkRow, ...]:
+    """Walk every case over every terrain; the terrain's number is the seed of its errors.
+
+    Args:
+        cases: What to vary; each case's own terrain and seed are replaced.
+        terrains: The grounds.
+        project: The project file; each process loads it.
+        jobs: Number of processes.
+    """
+    work = [
+        (project, replace(case, terrain=terrain, seed=seed))
+        for case in cases.values()
+        for seed, terrain in enumerate(terrains)
+    ]
+    walks: list[Any]
+    if jobs == 1:
+        system = load(project)
+        walks = [_summary(simulate_walk(system, case)) for _, case in work]
+    else:
+        from joblib import Parallel, delayed
+
+        walks = list(Parallel(n_jobs=jobs)(delayed(_walk)(*item) for item in work))
+    count = len(terrains)
+    rows = zip(cases, range(0, len(work), count))
+    return tuple(WalkRow.of(name, walks[at : at + count]) for name, at in rows)
+
+
+_SYSTEMS: dict[str, System] = {}
+
+
+def _walk(project: str, case: WalkCase) -> Walk:
+    if project not in _SYSTEMS:
+        _SYSTEMS[project] = load(project)
+    return _summary(simulate_walk(_SYSTEMS[project], case))
+
+
+def _summary(walk: Walk) -> Walk:
+    """Drop what a table does not need, so that processes exchange little."""
+    empty = np.zeros((0, 3))
+    short = {
+        name: getattr(walk.run, name)[:0]
+        for name in (
+            "time", "q", "v", "theta", "theta_dot", "tau_sea", "tau_motor", "tau_command",
+            "tau_osc", "measurement_age", "command_age", "contact_mode", "contact_force",
+        )
+    }  # fmt: skip
+    return replace(walk, run=replace(walk.run, **short, events=()), com=empty)
+
+
+def rough_terrains(count: int = 20, *, amplitude: float = 0.05) -> tuple[Terrain, ...]:
+    """Return random rough grounds.
+
+    Args:
+        count: How many.
+        amplitude: Their heights lie in ± this, m.
+    """
+    return tuple(rough_terrain(seed, amplitude=amplitude) for seed in range(count))
+
+
+def robustness_cases(*, steps: int = 20) -> dict[str, WalkCase]:
+    """Return the default walk with ideal and with ordinary sensors and models.
+
+    Args:
+        steps: Number of steps.
+    """
+    case = WalkCase(steps=steps)
+    noise = SensorNoise()
+    return {
+        "ideal sensors, exact model": case,
+        "encoder and IMU noise": replace(case, noise=noise),
+        "5 % model error": replace(case, model_error=0.05),
+        "noise and 5 % model error": replace(case, noise=noise, model_error=0.05),
+    }
+
+
+def ablation_cases(*, steps: int = 7) -> dict[str, WalkCase]:
+    """Return the default walk with each means left out, and the published law.
+
+    Args:
+        steps: Number of steps.
+    """
+    left_out = {
+        "everything": {},
+        "no preview": {"preview": False},
+        "prediction: constant velocity": {"prediction": Prediction.VELOCITY},
+        "no prediction": {"prediction": Prediction.NONE},
+        "no velocity feedforward": {"velocity_feedforward": False},
+        "no lead": {"lead": False},
+        "no acceleration feedforward": {"acceleration_feedforward": False},
+        "no position term in the planned velocity": {"position_rate": 0.0},
+        "no torque feedback": {"torque_feedback": 0.0},
+        "no task damping": {"task_damping": 0.0},
+        "footsteps by CoM velocity": {"momentum_placement": False},
+        "no apex correction": {"apex_correction": False},
+        "no averaging of the placement": {"placement_time": 0.0},
+        "no early touchdown": {"early_contact": False},
+    }
+    cases = {
+        name: WalkCase(steps=steps, options=WalkingOptions(**change))
+        for name, change in left_out.items()
+    }
+    whole = cases["everything"]
+    gait = replace(whole.gait, transfer_time=1e-3)
+    cases["no weight transfer"] = replace(whole, gait=gait)
+    law = WalkingOptions.published()
+    cases["published law"] = replace(whole, options=law)
+    cases["published law, link-side feedback"] = replace(
+        whole, options=WalkingOptions.published(feedback="joint")
+    )
+    cases["published law, no delay"] = replace(whole, options=law, delay_scale=0.0)
+    return cases
+
+
+def gain_cases(*, steps: int = 7) -> dict[str, WalkCase]:
+    """Return the default walk over spring stiffness, α, β and delay.
+
+    Args:
+        steps: Number of steps.
+    """
+    case = WalkCase(steps=steps)
+    cases = {}
+    for K in (200.0, 350.0, 700.0, 1000.0, 3000.0):
+        cases[f"K = {K:g} Nm/rad"] = replace(case, spring_stiffness=K)
+    for alpha in (0.1, 0.3, 1.0, 2.0):
+        cases[f"α = {alpha:g}"] = replace(case, damping_scale=alpha)
+    for beta in (0.1, 0.5, 1.0, 2.0):
+        cases[f"β = {beta:g}"] = replace(case, inertia_shaping=beta)
+    for scale in (0.0, 1.0, 2.0, 3.0, 4.0):
+        cases[f"delays × {scale:g}"] = replace(case, delay_scale=scale)
+    return cases
