@@ -290,7 +290,10 @@ def settle(
         for i in range(count):
             if touching[i] == 0:
                 continue
-            bad = -force[i, 2] if closed[i] else -target[i, 2] - _along(L, rows, i, x)
+            if closed[i]:
+                bad = -force[i, 2]
+            else:  # points of one sole may sink as little as they yield
+                bad = -target[i, 2] - _along(L, rows, i, x) - 1e3 * ridge[i]
             if bad > worst:
                 worst, which = bad, i
         if which < 0:

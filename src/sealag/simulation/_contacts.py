@@ -100,6 +100,11 @@ class Contacts:
         x, y, z = at.position[point].tolist()
         return z - float(self._radius[point]) - self.ground.height(x, y)
 
+    def lower_floors(self, at: Instant, before: IntArray) -> None:
+        """Let points of a sole that were closed before and are open now hang a little lower."""
+        for point in np.flatnonzero((before > self.closed) & (self.ridge == _SOLE)).tolist():
+            self._floor[point] = min(self.height(at, point), 0.0) - 0.5 * _RISEN
+
     def measure_gaps(self, at: Instant) -> None:
         """Measure the gaps of all open points."""
         for point in range(self.count):
@@ -196,7 +201,6 @@ class Contacts:
         x: Array,
         force: Array,
     ) -> None:
-        before = self.closed.copy()
         status = self._kernel.settle(
             at.L, at.rows, free, target, mask, self.closed, self.mu, self.ridge, yielding,
             self.foot_of,
@@ -208,6 +212,3 @@ class Contacts:
                 Outcome.CONTACT_UNSOLVABLE,
                 f"no contact forces satisfy unilateral contact and friction at {touching}",
             )
-        for point in np.flatnonzero(before > self.closed).tolist():
-            if self.ridge[point] == _SOLE:
-                self._floor[point] = min(self.height(at, point), 0.0) - 0.5 * _RISEN

@@ -335,7 +335,9 @@ class Plant:
         now, contacts = self._now, self.contacts
         before = contacts.closed.copy()
         if before[point]:
-            contacts.settle(now, contacts.touching(now))
+            contacts.closed[point] = 0
+            contacts.settle(now, np.maximum(contacts.touching(now), before))
+            contacts.lower_floors(now, before)
             self._evaluate(now)
             contacts.measure_gaps(now)
         else:
@@ -344,13 +346,16 @@ class Plant:
 
     def _touch(self, now: Instant, mask: IntArray) -> None:
         """Close every masked point by a plastic impact, then find which contacts hold."""
-        for point in np.flatnonzero(mask > self.contacts.closed):
-            self.contacts.close(now, int(point))
+        contacts = self.contacts
+        for point in np.flatnonzero(mask > contacts.closed):
+            contacts.close(now, int(point))
         if mask.any():
+            touched = contacts.closed.copy()
             self._strike(now, mask)
-            self.contacts.settle(now, self.contacts.touching(now))
+            contacts.settle(now, contacts.touching(now))
+            contacts.lower_floors(now, touched)
             self._evaluate(now)
-        self.contacts.measure_gaps(now)
+        contacts.measure_gaps(now)
 
     def _strike(self, now: Instant, mask: IntArray) -> None:
         speed, impulse = self.contacts.strike(now, mask)
