@@ -49,7 +49,8 @@ class DelayMargin:
         crossings: every crossing with its shortest delay and direction, by delay.
         intervals: ranges of delay with their unstable roots, when asked for; else empty.
         guaranteed: whether every frequency outside the crossings was excluded (up to rounding);
-            False where a root lies at zero whatever the delay and hides the slowest ones.
+            False where a root lies at zero whatever the delay: it hides the slowest crossings, so
+            that `first_crossing` may be too late there, while `delay` is 0.
         residual: relative residual of the characteristic equation at the first crossing.
         method: how it was found.
     """
@@ -118,7 +119,7 @@ def delay_margin(
         return _answer(loop, (), unstable=unstable, known=False)
     zero_root = on_axis and has_zero_root(loop)
     found, explained = crossings_in(transfer, candidate_bands(transfer, zero_root=zero_root))
-    if not explained:
+    if not (explained or zero_root):
         raise SolverError(
             "A band of frequencies could be neither excluded nor refined to a crossing; the "
             "margin is not known."
