@@ -137,7 +137,7 @@ def certify(
         spring_stiffness=system.actuators.spring_stiffness.tolist(),
         time_s=motion.time.tolist(),
         bounds_s=bounds.delay.tolist(),
-        proofs=_proofs(system, stack, bounds),
+        proofs=_proofs(system, stack, bounds, kind=kind),
         hashes={"urdf": system.robot.urdf_sha256, "project": system.sha256},
         versions={
             "sealag": __version__,
@@ -265,23 +265,35 @@ def _local(
     return margin, frozen.stable if potential else None
 
 
-def _proofs(system: System, stack: WholeBodyStack, bounds: Bounds) -> tuple[Proof, ...]:
+def _criterion_stiffness(system: System, stack: WholeBodyStack, kind: Criterion) -> Array:
+    """The task stiffness that a criterion is about, (N, m, m)."""
+    if kind is Criterion.CERTIFIED:
+        return stack.stiffness
+    force = system.hierarchy.form is StiffnessForm.FORCE
+    return np.broadcast_to(stack.K_x, stack.Lambda.shape) if force else stack.Lambda @ stack.K_x
+
+
+def _proofs(
+    system: System, stack: WholeBodyStack, bounds: Bounds, *, kind: Criterion
+) -> tuple[Proof, ...]:
     """Numbers to check for the instants with the smallest bounds."""
     usable = np.flatnonzero((bounds.delay > 0.0) & np.isfinite(bounds.delay))
     chosen = usable[np.argsort(bounds.delay[usable], kind="stable")][:PROOF_COUNT]
     D = system.actuators.motor_damping
+    if kind is Criterion.PUBLISHED and len(stack.levels) > 2:
+        return ()
+    S = _criterion_stiffness(system, stack, kind)
     return tuple(
         Proof(
             instant=int(k),
             delay_s=float(bounds.delay[k]),
             J_star=stack.J_star[k].tolist(),
-            stiffness=stack.stiffness[k].tolist(),
+            stiffness=S[k].tolist(),
             F_gravity=stack.F_gravity[k].tolist(),
             F=bounds.F[k].tolist(),
             Y=joint_multiplier(bounds.F[k], D, float(bounds.delay[k])).tolist(),
         )
         for k in chosen
-        if len(stack.levels) == 2 or system.criterion is Criterion.CERTIFIED
     )
 
 

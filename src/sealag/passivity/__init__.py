@@ -17,14 +17,17 @@ from sealag.passivity._certificate import (
 )
 from sealag.passivity._multipliers import joint_multiplier
 from sealag.passivity._multitask import MultitaskBound, max_delay_multitask
+from sealag.passivity._verify import Check, Verification, verify
 
 __all__ = [
     "Certificate",
+    "Check",
     "Criterion",
     "DelayBound",
     "MultitaskBound",
     "Proof",
     "Status",
+    "Verification",
     "Worst",
     "joint_multiplier",
     "limiting_direction",
@@ -32,5 +35,6 @@ __all__ = [
     "max_delay_from_stiffness",
     "max_delay_multitask",
     "read_certificate",
+    "verify",
     "write_certificate",
 ]

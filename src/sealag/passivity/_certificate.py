@@ -1,4 +1,4 @@
-"""The certificate: what was asked, what holds, under which assumptions, and the numbers to check."""
+"""The certificate: question, answer, assumptions, and the numbers to check them by."""
 
 import json
 import math

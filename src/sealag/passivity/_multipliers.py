@@ -14,7 +14,7 @@ def joint_multiplier(F: ArrayLike, D_theta: ArrayLike, delay: float) -> Array:
     Where D = I, every Y lies between the maximal solution of Y + d² F Y⁻¹ Fᵀ = 2I and 2I less the
     maximal solution of V + d² Fᵀ V⁻¹ F = 2I; their mean leaves room for rounding. Both come from
     cyclic reduction (Meini, Math. Comp. 2002), which converges quadratically, and exist if and
-    only if d ≤ 1 / w(D^-½ F D^-½). Y and the multiplier of (29) are related by Q = Y / d for J* = I.
+    only if d ≤ 1 / w(D^-½ F D^-½). Y belongs to the multiplier Q = Y / d of (29) for J* = I.
 
     Args:
         F: (n, n) delayed stiffness, Nm/rad.

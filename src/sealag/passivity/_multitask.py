@@ -1,5 +1,6 @@
 """Corollary 1 (31): several tasks with one delay."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -178,7 +179,9 @@ def _candidate(blocks: Sequence[Array]) -> list[Array] | None:
     matrix = cp.bmat(rows)
     problem = cp.Problem(cp.Maximize(d), [(matrix + matrix.T) / 2 >> 0])
     try:
-        problem.solve(solver=cp.CLARABEL)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # whatever the solver says of itself is checked here
+            problem.solve(solver=cp.CLARABEL)
     except (cp.SolverError, ValueError):
         return None
     found = [np.asarray(block.value, dtype=float) for block in Y]
