@@ -169,12 +169,12 @@ class Plant:
 
     @property
     def q(self) -> Array:
-        """Configuration (nq,)."""
+        """Present configuration of the robot (nq,)."""
         return self._now.q
 
     @property
     def v(self) -> Array:
-        """Velocity (nv,)."""
+        """Present tangent velocity of the robot (nv,)."""
         return self._now.v
 
     @property
