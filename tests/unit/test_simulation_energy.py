@@ -173,6 +173,14 @@ class TestPassivityObserver:
         assert audit.controller_side is not None
         assert audit.controller_side.passive
         assert audit.controller_side.first_violation is None
+        assert audit.controller_storage[0] == pytest.approx(0.5 * 100 * 0.3**2)
+        assert audit.delay_injection.max() > 0.1  # which the damping took
+
+    def test_without_delay_nothing_is_injected(self, tmp_path):
+        audit = self._run(tmp_path, 0.0).audit
+        late = self._run(tmp_path, 0.06).audit
+        # the hold of the 1 kHz loop is all that is left
+        assert np.abs(audit.delay_injection).max() < 0.02 * late.delay_injection.max()
 
     def test_not_passive_far_above(self, tmp_path):
         run = self._run(tmp_path, 0.3, duration=3.0)

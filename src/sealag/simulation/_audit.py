@@ -55,6 +55,10 @@ class Audit:
             motor_work less what tau_osc and the damping account for through B / B_s.
         residual: Energy present less energy expected (N,): the first law's error.
         throughput: Sum of the absolute changes of the stores (N,).
+        controller_storage: V_3 that the controller states (N,); None if it states none.
+        delay_injection: Work of the command less what V_3 gave (N,): the energy that delay,
+            sampling and losses have put into the robot; passive while the damping takes as much.
+            None if the controller states no storage.
         joint_side: Passivity of springs, motors, links and contacts (S_j).
         controller_side: Passivity of controller and delay (S_c); None if the controller states
             no storage function.
@@ -67,6 +71,8 @@ class Audit:
     inertia_shaping: Array
     residual: Array
     throughput: Array
+    controller_storage: Array | None
+    delay_injection: Array | None
     joint_side: Passivity
     controller_side: Passivity | None
 
@@ -111,9 +117,10 @@ def audit(
     tolerance = 2.0 * spent + 1e-9 * float(throughput[-1]) + 1e-12 if time.size else 0.0
     s_j = stores[:, :3].sum(axis=1) + shaped
     joint_slack = drive.sum(axis=1) + scalar[:, 3] - (s_j - s_j[:1])
-    control = None
+    control = injection = None
     if storage is not None:
-        slack = -drive.sum(axis=1) - (storage - storage[:1])
+        injection = flows["command"].sum(axis=1) + storage - storage[:1]
+        slack = flows["damping"].sum(axis=1) - injection
         control = _observe(time, slack, drive, joints, tolerance)
     return Audit(
         time=time,
@@ -123,6 +130,8 @@ def audit(
         inertia_shaping=(flows["motor_work"] - ratio * drive).sum(axis=1),
         residual=residual,
         throughput=throughput,
+        controller_storage=storage,
+        delay_injection=injection,
         joint_side=_observe(time, joint_slack, -drive, joints, tolerance),
         controller_side=control,
     )
