@@ -280,8 +280,6 @@ def _proofs(
     usable = np.flatnonzero((bounds.delay > 0.0) & np.isfinite(bounds.delay))
     chosen = usable[np.argsort(bounds.delay[usable], kind="stable")][:PROOF_COUNT]
     D = system.actuators.motor_damping
-    if kind is Criterion.PUBLISHED and len(stack.levels) > 2:
-        return ()
     S = _criterion_stiffness(system, stack, kind)
     return tuple(
         Proof(

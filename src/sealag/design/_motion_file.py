@@ -119,7 +119,8 @@ def _read_csv(path: Path) -> dict[str, Array]:
         names = [name.strip() for name in file.readline().strip().split(",")]
         if len(set(names)) < len(names):
             raise MotionError(f"{path}: a column name occurs twice.")
-        values = np.genfromtxt(file, delimiter=",", ndmin=2)
+        rows = [row for row in file if row.strip()]
+    values = np.genfromtxt(rows, delimiter=",", ndmin=2) if rows else np.zeros((0, 0))
     if values.size == 0 or values.shape[1] != len(names):
         raise MotionError(f"{path}: the rows do not have the {len(names)} columns of the head.")
     return dict(zip(names, values.T, strict=True))

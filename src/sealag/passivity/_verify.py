@@ -35,6 +35,10 @@ class Check:
     ok: bool
     detail: str
 
+    def __post_init__(self) -> None:
+        """Keep a plain truth value, which JSON can say."""
+        object.__setattr__(self, "ok", bool(self.ok))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verification:
@@ -167,11 +171,14 @@ def _claims(data: dict[str, Any]) -> Iterator[Check]:
 def _proofs(data: dict[str, Any], number: Callable[[Any], Array]) -> Iterator[Check]:
     D, K = number(data["D_theta"]), number(data["spring_stiffness"])
     n = len(data["joints"])
+    positive = len(D) == len(K) == n and all(v > 0 for v in (*D, *K))
     yield Check(
         name="damping and springs",
-        ok=len(D) == len(K) == n and all(v > 0 for v in (*D, *K)),
-        detail=f"{n} joints, all positive",
+        ok=positive,
+        detail=f"{n} joints, all positive" if positive else "not all are positive",
     )
+    if not positive:
+        return
     for proof in data["proofs"]:
         name = f"instant {proof['instant']}"
         bound = data["bounds_s"][proof["instant"]]
@@ -205,7 +212,7 @@ def _scaled(block: Array, D: Array) -> Array:
 
 
 def _float(value: Any) -> float:
-    return value if isinstance(value, float) else float(value.p) / float(value.q)
+    return value if isinstance(value, float) else int(value.p) / int(value.q)
 
 
 def _stiffness(

@@ -1,0 +1,124 @@
+"""What `sealag certify` answers for the bundled and example designs, and what files it writes."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sealag.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+FIELDS = {
+    "status", "criterion", "max_delay_s", "delay_s", "asymmetry", "worst", "instants", "feedback",
+    "stable", "local_margin_s", "first_crossing_s", "unstable_modes", "assumptions",
+}  # fmt: skip
+DESIGNS = ["bundled:hume", *(f"{ROOT}/examples/{n}.toml" for n in
+           ("anymal", "anymal_crawl", "talos", "baxter"))]  # fmt: skip
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+@pytest.mark.parametrize("design", DESIGNS, ids=lambda d: Path(d).stem)
+@pytest.mark.parametrize("criterion", ["certified", "published"])
+def test_answers_with_the_contract(design, criterion, tmp_path, capsys):
+    out = tmp_path / "c.json"
+    code, text, err = run(
+        capsys, "certify", design, "--criterion", criterion, "--json", "--out", out
+    )
+    answer = json.loads(text)
+    assert err == ""
+    assert set(answer) >= FIELDS
+    assert answer["criterion"] == criterion
+    assert code == (0 if answer["status"] == "certified" else 1)
+    assert (answer["delay_s"] <= answer["max_delay_s"]) == (answer["status"] == "certified")
+    assert sum(answer["worst"]["direction"].values()) == pytest.approx(1.0)
+    assert answer["max_delay_s"] <= answer["max_delay_upper_s"]
+    margin = answer["local_margin_s"]
+    if answer["stable"] and criterion == "certified":
+        assert margin is None or margin >= answer["max_delay_s"]
+    code, text, _ = run(capsys, "verify", out, "--json")
+    assert json.loads(text)["valid"] is True
+
+
+def test_motion_of_many_instants(tmp_path, capsys):
+    from sealag.design import load, save_motion
+    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+
+    system = load("bundled:hume")
+    motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=200.0)
+    answers = []
+    for ending in (".csv", ".npz", ".parquet"):
+        path = tmp_path / f"walk{ending}"
+        save_motion(motion, system.robot, path)
+        code, text, _ = run(
+            capsys, "certify", "bundled:hume", "--motion", path, "--json", "--out",
+            tmp_path / "c.json",
+        )  # fmt: skip
+        answers.append(json.loads(text))
+        assert code == 0
+    assert answers[0]["instants"] == len(motion)
+    assert answers[0]["worst"]["time_s"] == pytest.approx(
+        motion.time[answers[0]["worst"]["instant"]]
+    )
+    for other in answers[1:]:
+        assert other["max_delay_s"] == pytest.approx(answers[0]["max_delay_s"], rel=1e-12)
+    whole = json.loads((tmp_path / "c.json").read_text())
+    assert len(whole["bounds_s"]) == len(motion)
+    assert min(whole["bounds_s"]) == whole["max_delay_s"]
+
+
+def test_margin_command(capsys):
+    code, text, _ = run(capsys, "margin", ROOT / "examples/baxter.toml", "--json")
+    answer = json.loads(text)
+    assert code == 0
+    assert answer["delay_s"] == pytest.approx(answer["first_crossing_s"])
+    assert 0.05 < answer["delay_s"] < 0.2
+    assert answer["unstable_modes"] == 0
+
+
+def test_starter_file_certifies_once_filled(tmp_path, capsys):
+    from sealag.robot import bundled_robot_path
+
+    path = tmp_path / "mine.toml"
+    code, _, _ = run(capsys, "init", bundled_robot_path("hume"), "--out", path)
+    assert code == 0
+    code, _, err = run(capsys, "certify", path)
+    assert code == 2
+    assert "still to be filled in" in err
+    text = path.read_text()
+    for fill, value in (
+        ("FILL: K,", "350.0"), ("FILL: beta", "0.5"), ("FILL: D_theta", "50.0"),
+        ("FILL: 1/s", "100.0"), ("FILL: T_H", "10.0"), ("FILL: T_L", "2.0"), ("FILL: B ", "0.1"),
+    ):  # fmt: skip
+        start = text.index(f'"{fill}')
+        text = text[:start] + value + text[text.index('"', start + 1) + 1 :]
+    path.write_text(text)
+    code, out, err = run(capsys, "certify", path, "--json", "--out", tmp_path / "c.json")
+    assert err == ""
+    assert code in (0, 1)
+    assert json.loads(out)["max_delay_s"] > 0.0
+    code, _, err = run(capsys, "init", bundled_robot_path("hume"), "--out", path)
+    assert code == 2
+    assert "exists already" in err
+
+
+def test_installed_command_prints_json_only(tmp_path):
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", "from sealag.cli import main; main()", "certify", "bundled:hume",
+         "--json"],
+        capture_output=True, text=True, timeout=120, cwd=tmp_path, env=environment, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["status"] == "not_certified"
+    assert done.stderr == ""
+    assert np.isfinite(json.loads(done.stdout)["max_delay_s"])
