@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.simulation._ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
+from sealag.simulation._ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES, residual
 from sealag.typing import Array
 
 
@@ -91,7 +91,6 @@ def audit(
     stores: Array,
     joint: Array,
     scalar: Array,
-    residual: Array,
     throughput: Array,
     storage: Array | None,
     shaped: Array,
@@ -105,7 +104,6 @@ def audit(
         stores: Energies (N, 4), J.
         joint: Works per joint (N, 8, n), J.
         scalar: Other works (N, 5), J.
-        residual: First-law residual (N,), J.
         throughput: Energy moved (N,), J.
         storage: Controller's V_3 (N,), J; None if it states none.
         shaped: Energy of the shaped rotors ½ θ̇ᵀB_s θ̇ (N,), J.
@@ -113,7 +111,8 @@ def audit(
     """
     flows = {name: joint[:, k] for k, name in enumerate(JOINT_FLOWS)}
     drive = flows["command"] - flows["damping"]
-    spent = float(np.abs(residual).max(initial=0.0))
+    error = residual(stores, joint, scalar)
+    spent = float(np.abs(error).max(initial=0.0))
     tolerance = 2.0 * spent + 1e-9 * float(throughput[-1]) + 1e-12 if time.size else 0.0
     s_j = stores[:, :3].sum(axis=1) + shaped
     joint_slack = drive.sum(axis=1) + scalar[:, 3] - (s_j - s_j[:1])
@@ -128,7 +127,7 @@ def audit(
         joint_flows=flows,
         scalar_flows={name: scalar[:, k] for k, name in enumerate(SCALAR_FLOWS)},
         inertia_shaping=(flows["motor_work"] - ratio * drive).sum(axis=1),
-        residual=residual,
+        residual=error,
         throughput=throughput,
         controller_storage=storage,
         delay_injection=injection,

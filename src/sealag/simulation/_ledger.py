@@ -26,7 +26,6 @@ class Ledger:
         joint: Rows as in JOINT_FLOWS (8, n).
         scalar: As in SCALAR_FLOWS (5,); the first four are works done on the robot, impact is lost.
         stores: Energies at the present instant as in STORES (4,).
-        first: Energies at the beginning (4,).
         throughput: Sum of the absolute changes of the stores, J.
     """
 
@@ -36,7 +35,7 @@ class Ledger:
         self._tally, self._stores, self._parameters = tally, stores, parameters
         n = parameters.shape[0]
         self.joint, self.scalar = np.zeros((len(JOINT_FLOWS), n)), np.zeros(len(SCALAR_FLOWS))
-        self.stores, self.first = np.zeros(4), np.zeros(4)
+        self.stores = np.zeros(4)
         self._moved = np.zeros(1)
 
     @property
@@ -44,22 +43,12 @@ class Ledger:
         """Energy moved between stores so far, J."""
         return float(self._moved[0])
 
-    @property
-    def residual(self) -> float:
-        """Energy present minus energy expected from all works, J: zero but for the integrator."""
-        port_in = self.joint[2].sum() - self.joint[5:].sum()
-        return float(self.stores.sum() - self.first.sum() - port_in - self._outside())
-
-    def _outside(self) -> float:
-        return float(self.scalar[:4].sum() - self.scalar[4])
-
     def begin(self, at: Instant) -> None:
         """Open empty books at an instant."""
         self.joint[:] = 0.0
         self.scalar[:] = 0.0
         self._moved[:] = 0.0
         self._stores(self._parameters, at.z, at.q, at.power[4], at.potential, self.stores)
-        self.first[:] = self.stores
 
     def add(self, work: Array, powers: Array, step: float, at: Instant) -> None:
         """Book one step: joint works (n, 7), stage powers (4, 5), and the stores after it."""
@@ -74,3 +63,16 @@ class Ledger:
         before = self.stores.copy()
         self._stores(self._parameters, at.z, at.q, at.power[4], at.potential, self.stores)
         self._moved += np.abs(self.stores - before).sum()
+
+
+def residual(stores: Array, joint: Array, scalar: Array) -> Array:
+    """Return energy present less energy expected from all works (N,), J, of logged books.
+
+    Zero but for the integrator: stores (N, 4), joint works (N, 8, n) and other works (N, 5) come
+    from separate integrals.
+    """
+    present = stores.sum(axis=1) - stores[:1].sum()
+    works = joint.sum(axis=2)
+    return (
+        present - works[:, 2] + works[:, 5:].sum(axis=1) - scalar[:, :4].sum(axis=1) + scalar[:, 4]
+    )

@@ -22,6 +22,7 @@ from sealag.simulation._ledger import Ledger
 from sealag.simulation._outcome import EventKind, Outcome, PlantStop
 from sealag.typing import Array, IntArray
 
+FASTEST = 1e4  # rad/s, m/s: beyond any physical range
 _EVENTS_PER_STEP = 60
 _STABLE = 2.0  # swing of a link on its spring in a step, rad; Runge-Kutta is stable to 2.8
 _LOCATE = 40
@@ -292,8 +293,9 @@ class Plant:
             contacts.torsion, at.solved,
         )  # fmt: skip
         if not solved:
+            tame = float(np.abs(at.v).max()) < FASTEST
             raise PlantStop(
-                Outcome.DIVERGED if not np.isfinite(at.q).all() else Outcome.CONTACT_UNSOLVABLE,
+                Outcome.CONTACT_UNSOLVABLE if tame else Outcome.DIVERGED,
                 f"the equations of motion have no solution after t = {self.time:.4f} s",
             )
 
