@@ -13,6 +13,7 @@ GRAVITY = 9.81
 _STEPS = 16
 _FORWARD = (-0.15, 0.55)  # m from the stance foot: what the legs reach
 _WIDEST = 0.5  # m
+_FASTER = 0.3  # largest relative correction of the speed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,8 +90,7 @@ class Placement:
         self._x, self._v = np.zeros(2), np.zeros(2)
         self._end_x, self._end_v = np.zeros(2), np.zeros(2)
         self._fresh = True
-        self._apex_loss: float | None = None
-        self._before = 0.0
+        self._started, self._before, self._faster = False, 0.0, 0.0
 
     def restart(self) -> None:
         """Forget the average: a new step begins."""
@@ -116,7 +116,7 @@ class Placement:
         if options.momentum_placement:
             self._v[0] += angular[1] / (self._mass * arm)
             self._v[1] -= angular[0] / (self._mass * arm)
-        self._watch_apex(float(com[0] - step.new[0]), float(angular[1]) / (self._mass * arm))
+        self._watch_apex(float(com[0] - step.new[0]), float(com_rate[0]), float(self._v[0]))
         self._kernel.pendulum(
             self._x, self._v, phase, gait.step_time, gait.transfer_time, step.old, step.new,
             step.height, step.offset, _STEPS,
@@ -130,20 +130,23 @@ class Placement:
         if gait.step_time - phase > options.placement_freeze:
             self._place(step)
 
-    def _watch_apex(self, ahead: float, loss: float) -> None:
-        """Learn what the legs' momentum takes from the CoM's speed at the apex."""
-        if self._apex_loss is None:
-            self._apex_loss = loss
+    def _watch_apex(self, ahead: float, speed: float, pendulum: float) -> None:
+        """Integrate the relative error of the apex speed; begin with what the legs' momentum adds.
+
+        At the start, an apex, the CoM moves at the plan's speed and the pendulum more slowly.
+        """
+        planned = self._gait.apex_speed
+        if not self._started:
+            self._started, self._faster = True, (pendulum - speed) / planned
         elif self._before < 0.0 <= ahead:
-            self._apex_loss += 0.5 * (loss - self._apex_loss)
+            self._faster += self._options.apex_gain * (planned - speed) / planned
+            self._faster = min(max(self._faster, -_FASTER), _FASTER)
         self._before = ahead
 
     def _place(self, step: StepReferences) -> None:
         """Solve ξ(T) = u + ξ_plan for the foothold u of the next step."""
         plan, side = self.plan, step.outward()
-        speed = 1.0
-        if self._options.apex_correction and self._options.momentum_placement:
-            speed += (self._apex_loss or 0.0) / self._gait.apex_speed
+        speed = 1.0 + (self._faster if self._options.apex_gain > 0.0 else 0.0)
         wanted = (plan.end_forward * speed, -side * plan.end_outward)
         u = [0.0, 0.0]
         for k in range(2):
