@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import minimize
 
-from sealag.kernels import contact, rigid
+from sealag.kernels import contact, friction, rigid
 from sealag.robot import load_robot
 
 FEET = ("left_foot", "right_foot")
@@ -57,7 +57,7 @@ def _solve(M, right, J, C, target, closed, mu):
     free = np.linalg.solve(L, right)
     x, force, yielding = np.zeros(nv), np.zeros((count, 3)), np.zeros(count)
     none, foot_of = np.zeros((0, 2)), np.zeros(count, np.int64)
-    assert contact.solve(
+    assert friction.solve(
         L, rows, free, target, closed, mu, np.full(count, 1e-11), yielding, foot_of, none,
         np.zeros((0, nv)), np.zeros(0), x, force,
     )  # fmt: skip
@@ -153,7 +153,7 @@ def test_settle_opens_what_pulls():
     free = np.linalg.solve(L, np.array([-9.81, 20.0]))
     closed, mask = np.ones(2, np.int64), np.ones(2, np.int64)
     x, force = np.zeros(2), np.zeros((2, 3))
-    status = contact.settle(
+    status = friction.settle(
         L, rows, free, np.zeros((2, 3)), mask, closed, np.zeros(2), np.full(2, 1e-11), np.zeros(2),
         np.zeros(2, np.int64), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), 1e-9, x, force,
     )  # fmt: skip

@@ -1,24 +1,13 @@
-"""Contact kernels: point kinematics, friction, constrained dynamics, which contacts hold.
+"""Contact kernels: kinematics of the contact points and constrained forward dynamics.
 
-Every foot is one or several points. A point's contact frame C has rows tangent, tangent, normal;
-forces and impulses are given in it. A closed point has no normal acceleration (but for the return
-to where it closed) and Coulomb friction in the form
-
-    w = v_t + T a_t,   |f_t| <= mu f_n,   w = 0 or f_t = -mu f_n w / |w|,
-
-so that a point sticks whenever friction can stop it within the time T, and slides against the
-velocity that it is about to have. The law is continuous; T is the step, and 0 is Coulomb's law.
+Every foot is one or several points. A point's contact frame C has rows tangent, tangent, normal.
 """
-
-import math
 
 import numpy as np
 from numba import njit
 
-from sealag.kernels.rigid import _backward, _forward, cholesky
-
-_CONE = 1e-10  # relative accuracy of the friction cone
-_ITERATIONS = 60
+from sealag.kernels.friction import solve, twist_torque
+from sealag.kernels.rigid import cholesky, forward_solve
 
 
 @njit(cache=True)
@@ -91,106 +80,7 @@ def project(L, J, C, rows):
                 rows[i, a, c] = (
                     C[i, a, 0] * J[i, 0, c] + C[i, a, 1] * J[i, 1, c] + C[i, a, 2] * J[i, 2, c]
                 )
-            _forward(L, rows[i, a])
-
-
-@njit(cache=True)
-def _assemble(rows, free, target, closed, mu, ridge, owner, G, b):
-    """Write the contact equations G f = b of all closed points; return their number of rows."""
-    size = 0
-    for i in range(closed.size):
-        if closed[i]:
-            for a in range(0 if mu[i] > 0.0 else 2, 3):
-                owner[size, 0], owner[size, 1] = i, a
-                size += 1
-    largest = 0.0
-    nv = free.size
-    for r in range(size):
-        i, a = owner[r]
-        s = target[i, a]
-        for c in range(nv):
-            s += rows[i, a, c] * free[c]
-        b[r] = -s
-        for k in range(r + 1):
-            s = 0.0
-            j, d = owner[k]
-            for c in range(nv):
-                s += rows[i, a, c] * rows[j, d, c]
-            G[r, k] = s
-            G[k, r] = s
-        largest = max(largest, G[r, r])
-    for r in range(size):
-        G[r, r] += ridge[owner[r, 0]] * largest
-    return size
-
-
-@njit(cache=True)
-def _friction(G, b, owner, size, mu, yielding, f):
-    """Solve (G + diag(yielding)) f = b with yielding >= 0 such that every cone holds.
-
-    ``yielding`` (P,) is -w / f_t of a sliding point over T, 0 of a sticking one. Newton on
-    mu f_n / |f_t| = 1, which is nearly affine in it (as in trust regions).
-    """
-    H = np.empty((size, size))
-    L = np.zeros((size, size))
-    slope = np.empty(size)
-    low = np.zeros(mu.size)
-    high = np.full(mu.size, np.inf)
-    for _ in range(_ITERATIONS):
-        for r in range(size):
-            for k in range(size):
-                H[r, k] = G[r, k]
-            if owner[r, 1] < 2:
-                H[r, r] += yielding[owner[r, 0]]
-            f[r] = b[r]
-        if not cholesky(H, L):
-            return False
-        _forward(L, f)
-        _backward(L, f)
-        settled = True
-        for r in range(2, size):
-            i = owner[r, 0]
-            if owner[r, 1] != 2 or mu[i] == 0.0 or mu[i] == np.inf:
-                continue
-            normal = f[r]
-            tangent = math.hypot(f[r - 2], f[r - 1])
-            excess = tangent - mu[i] * normal
-            if abs(excess) <= _CONE * abs(mu[i] * normal) or (excess < 0.0 and yielding[i] == 0.0):
-                continue
-            settled = False
-            if excess > 0.0:
-                low[i] = yielding[i]
-            else:
-                high[i] = yielding[i]
-            guess = np.inf
-            if normal > 0.0 and tangent > 0.0:
-                slope[:] = 0.0
-                slope[r - 2], slope[r - 1] = -f[r - 2], -f[r - 1]
-                _forward(L, slope)
-                _backward(L, slope)
-                along = (f[r - 2] * slope[r - 2] + f[r - 1] * slope[r - 1]) / tangent
-                ratio = mu[i] * normal / tangent
-                rate = (mu[i] * slope[r] - ratio * along) / tangent
-                if rate > 0.0:
-                    guess = yielding[i] + (1.0 - ratio) / rate
-                    if low[i] == 0.0 and guess < 0.0:
-                        guess = 0.0
-            yielding[i] = _inside(guess, low[i], high[i], G[r, r])
-            if high[i] - low[i] <= 1e-14 * high[i]:  # moved by the other points: begin again
-                low[i], high[i] = 0.0, np.inf
-        if settled:
-            break
-    return True
-
-
-@njit(cache=True)
-def _inside(guess, low, high, scale):
-    """Keep an iterate inside its bracket, else divide the bracket geometrically."""
-    if low < guess < high or (guess == 0.0 and low == 0.0):
-        return guess
-    if high == np.inf:
-        return 4.0 * low + scale
-    return math.sqrt(max(low, 1e-12 * high) * high)
+            forward_solve(L, rows[i, a])
 
 
 @njit(cache=True)
@@ -209,110 +99,7 @@ def twist(L, J_frame, v, C, foot_of, rows, spin):
                 s += C[i, 2, a] * J_frame[f, 3 + a, c]
             rows[f, c] = s
             spin[f] += s * v[c]
-        _forward(L, rows[f])
-
-
-@njit(cache=True)
-def _twist_torque(force, closed, foot_of, torsion, spin, torque):
-    """Write -clip(c spin) within the radius times the normal load; return the largest change."""
-    change = 0.0
-    for f in range(spin.size):
-        load = 0.0
-        for i in range(closed.size):
-            if foot_of[i] == f and closed[i] and force[i, 2] > 0.0:
-                load += force[i, 2]
-        limit = torsion[f, 1] * load if load > 0.0 else 0.0
-        new = -min(max(torsion[f, 0] * spin[f], -limit), limit)
-        change = max(change, abs(new - torque[f]))
-        torque[f] = new
-    return change
-
-
-@njit(cache=True)
-def solve(
-    L, rows, free, target, closed, mu, ridge, yielding, foot_of, torsion, twist_rows, spin,
-    x, force,
-):  # fmt: skip
-    """Meet the contact conditions of the closed points.
-
-    ``free`` (nv,) is L⁻¹ times the unconstrained right side, ``ridge`` (P,) the relative compliance
-    that shares force between redundant points, ``yielding`` (P,) a first guess that is improved,
-    ``torsion`` (F, 2) friction torque about the normal: per rate, and per normal
-    force. Writes x (nv,) and force (P, 3); returns False if there is no solution.
-    """
-    count = 3 * closed.size
-    G = np.empty((count, count))
-    b = np.empty(count)
-    f = np.empty(count)
-    owner = np.empty((count, 2), np.int64)
-    torque = np.zeros(spin.size)
-    _twist_torque(force, closed, foot_of, torsion, spin, torque)
-    for _ in range(_ITERATIONS):
-        x[:] = free
-        for k in range(spin.size):
-            if torque[k] != 0.0:
-                for c in range(x.size):
-                    x[c] += twist_rows[k, c] * torque[k]
-        size = _assemble(rows, x, target, closed, mu, ridge, owner, G, b)
-        force[:] = 0.0
-        if size > 0 and not _friction(G, b, owner, size, mu, yielding, f[:size]):
-            return False
-        for r in range(size):
-            i, a = owner[r]
-            force[i, a] = f[r]
-            for c in range(x.size):
-                x[c] += rows[i, a, c] * f[r]
-        if _twist_torque(force, closed, foot_of, torsion, spin, torque) < 1e-10:
-            break
-    _backward(L, x)
-    return True
-
-
-@njit(cache=True)
-def settle(
-    L, rows, free, target, touching, closed, mu, ridge, yielding, foot_of, torsion, twist_rows,
-    spin, tolerance, x, force,
-):  # fmt: skip
-    """Find which touching points are closed, so that none pulls and none sinks in.
-
-    Works on accelerations and forces, or on velocities and impulses (plastic impact, without
-    torsion). Starts from ``closed`` and changes the worst point until nothing is violated. Returns
-    0 when settled, 1 if no consistent set was found, 2 if the equations have no solution.
-    """
-    count = closed.size
-    for _ in range(8 * count + 8):
-        if not solve(
-            L, rows, free, target, closed, mu, ridge, yielding, foot_of, torsion, twist_rows, spin,
-            x, force,
-        ):  # fmt: skip
-            return 2
-        worst, which = tolerance, -1
-        for i in range(count):
-            if touching[i] == 0:
-                continue
-            if closed[i]:
-                bad = -force[i, 2]
-            else:  # points of one sole may sink as little as they yield
-                bad = -target[i, 2] - _along(L, rows, i, x) - 1e3 * ridge[i]
-            if bad > worst:
-                worst, which = bad, i
-        if which < 0:
-            return 0
-        closed[which] = 1 - closed[which]
-        yielding[which] = 0.0
-    return 1
-
-
-@njit(cache=True)
-def _along(L, rows, i, x):
-    """Normal component of J x, from rows = L⁻¹ (C J)ᵀ: (Lᵀ x) · rows."""
-    s = 0.0
-    for c in range(x.size):
-        lx = 0.0
-        for k in range(c, x.size):
-            lx += L[k, c] * x[k]
-        s += lx * rows[i, 2, c]
-    return s
+        forward_solve(L, rows[f])
 
 
 @njit(cache=True)
@@ -345,13 +132,42 @@ def _contact_power(C, velocity, force, closed, out):
 
 
 @njit(cache=True)
+def _kinetic(M, v):
+    total = 0.0
+    for i in range(v.size):
+        for j in range(v.size):
+            total += 0.5 * v[i] * M[i, j] * v[j]
+    return total
+
+
+@njit(cache=True)
+def _apply(nle, joint, motor, spring, v, load, J, velocity, tau, right):
+    """Write spring torques and all applied generalised forces; return the power of the loads."""
+    nv, n = v.size, joint.size
+    for i in range(nv):
+        right[i] = -nle[i]
+    for i in range(n):
+        tau[i] = spring[0][i] * (motor[i, 0] - joint[i])
+        tau[i] += spring[1][i] * (motor[i, 1] - v[nv - n + i])
+        right[nv - n + i] += tau[i]
+    power = 0.0
+    for k in range(load.shape[0]):
+        for a in range(3):
+            if load[k, a] != 0.0:
+                power += load[k, a] * velocity[k, a]
+                for c in range(nv):
+                    right[c] += J[k, a, c] * load[k, a]
+    return power
+
+
+@njit(cache=True)
 def evaluate(
     M, nle, frames, v, joint, motor, spring, shape, ground, rates, state, load, torsion, instant
 ):
     """Spring torque, applied forces, contact forces and acceleration at one instant.
 
     Groups of arrays, all preallocated: ``frames`` (J, R, p, drift) of the feet and loaded frames,
-    ``joint`` link positions (n,), ``motor`` (n, 2) angle and speed, ``spring`` (K, D_s),
+    ``joint`` link positions (n,), ``motor`` (n, 2 or more) angle and speed, ``spring`` (K, D_s),
     ``shape`` (frame_of, offset), ``ground`` (C, anchor, mu, ridge), ``rates`` (stabilisation
     gain, stop time), ``state`` (closed, yielding), ``load`` forces (L, 3) on the points after the
     contact points, ``torsion`` as in ``solve``. Writes ``instant``: tau, acceleration, force,
@@ -365,38 +181,23 @@ def evaluate(
     tau, acceleration, force, position, velocity, target, right, L, rows = instant[:9]
     power, J, drift, twist_rows, spin = instant[9:]
     points(J_frame, R, p, drift_frame, v, frame_of, offset, J, position, velocity, drift)
-    nv, n, count = v.size, joint.size, closed.size
-    for i in range(nv):
-        right[i] = -nle[i]
-    for i in range(n):
-        tau[i] = spring[0][i] * (motor[i, 0] - joint[i])
-        tau[i] += spring[1][i] * (motor[i, 1] - v[nv - n + i])
-        right[nv - n + i] += tau[i]
-    power[3] = 0.0
-    for k in range(load.shape[0]):
-        for a in range(3):
-            if load[k, a] != 0.0:
-                power[3] += load[k, a] * velocity[count + k, a]
-                for c in range(nv):
-                    right[c] += J[count + k, a, c] * load[k, a]
+    count = closed.size
+    power[3] = _apply(nle, joint, motor, spring, v, load, J[count:], velocity[count:], tau, right)
     demand(C, position, anchor, velocity, drift, rates[0], rates[1], target)
-    power[4] = 0.0
-    for i in range(nv):
-        for j in range(nv):
-            power[4] += 0.5 * v[i] * M[i, j] * v[j]
+    power[4] = _kinetic(M, v)
     if not cholesky(M, L):
         return False
     project(L, J, C, rows)
     twist(L, J_frame, v, C, frame_of[:count], twist_rows, spin)
     free = right.copy()
-    _forward(L, free)
+    forward_solve(L, free)
     solved = solve(
         L, rows, free, target, closed, mu, ridge, yielding, frame_of[:count], torsion, twist_rows,
         spin, acceleration, force,
     )  # fmt: skip
     _contact_power(C, velocity, force, closed, power)
     torque = np.zeros(spin.size)
-    _twist_torque(force, closed, frame_of[:count], torsion, spin, torque)
+    twist_torque(force, closed, frame_of[:count], torsion, spin, torque)
     power[2] = 0.0
     for f in range(spin.size):
         power[2] += torque[f] * spin[f]
@@ -423,11 +224,6 @@ def warm() -> None:
         M, v, frames, v, np.zeros(1), np.zeros((1, 2)), spring, shape, ground, rates, state, load,
         torsion, instant,
     )  # fmt: skip
-    L, rows, closed = instant[7], instant[8], state[0]
-    project(L, instant[10], ground[0], rows)
+    project(instant[7], instant[10], ground[0], instant[8])
     demand(ground[0], one, one, one, one, 50.0, 1e-3, one.copy())
-    settle(
-        L, rows, v, one, closed, closed, ground[2], ground[3], state[1], shape[0], torsion,
-        instant[12], instant[13], 1e-9, v.copy(), one.copy(),
-    )  # fmt: skip
-    margins(ground[0], one, one, np.zeros(1), closed, 1.0, np.zeros(1))
+    margins(ground[0], one, one, np.zeros(1), state[0], 1.0, np.zeros(1))

@@ -125,7 +125,7 @@ def cholesky(A, L):
 
 
 @njit(cache=True)
-def _forward(L, x):
+def forward_solve(L, x):
     for i in range(x.size):
         s = x[i]
         for k in range(i):
@@ -134,7 +134,7 @@ def _forward(L, x):
 
 
 @njit(cache=True)
-def _backward(L, x):
+def backward_solve(L, x):
     for i in range(x.size - 1, -1, -1):
         s = x[i]
         for k in range(i + 1, x.size):

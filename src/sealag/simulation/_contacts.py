@@ -41,9 +41,9 @@ class Contacts:
         stabilisation: float,
         stop_time: float,
     ) -> None:
-        from sealag.kernels import contact
+        from sealag.kernels import contact, friction
 
-        self._kernel = contact
+        self._kernel, self._friction = contact, friction
         self.feet, self.ground, self.rates = tuple(feet), ground, (stabilisation, stop_time)
         frames = [foot.contact.frame for foot in feet]
         self.body = Body(robot, [*frames, *loaded_frames])
@@ -201,7 +201,7 @@ class Contacts:
         x: Array,
         force: Array,
     ) -> None:
-        status = self._kernel.settle(
+        status = self._friction.settle(
             at.L, at.rows, free, target, mask, self.closed, self.mu, self.ridge, yielding,
             self.foot_of,
             self.torsion, at.twist_rows, spin, 1e-9 * self._weight, x, force,

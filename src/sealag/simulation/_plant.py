@@ -288,7 +288,7 @@ class Plant:
         contacts.body.evaluate(at, contacts.all_frames if used is None else used)
         solved = self._contact_kernel.evaluate(
             at.M, at.nle, contacts.body.frames, at.v, at.q[-self.robot.n :],
-            at.z[:, :2] if motor is None else motor, self._spring, contacts.shape,
+            at.z if motor is None else motor, self._spring, contacts.shape,
             contacts.ground_arrays, contacts.rates, contacts.state, self.load,
             contacts.torsion, at.solved,
         )  # fmt: skip
