@@ -82,7 +82,7 @@ def theirs(step: float, duration: float = 1.0) -> float:
     return (time.perf_counter() - start) / duration
 
 
-def main() -> None:
+def run() -> None:
     """Print both, and their ratio at equal step and at equal error (see the oracle's table)."""
     ours(1e-3, 0.05)
     for step in (1e-3, 5e-4):
@@ -97,4 +97,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run()
