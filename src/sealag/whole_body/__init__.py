@@ -1,5 +1,6 @@
 """The whole-body controller: tasks, contact-consistent matrices, and what it feeds back."""
 
+from sealag.whole_body._controller import Controller, ControllerOptions
 from sealag.whole_body._linearise import Linearisation, linearise
 from sealag.whole_body._protocol import Measurement, StoringController, TickController
 from sealag.whole_body._stack import (
@@ -22,6 +23,8 @@ from sealag.whole_body._tasks import (
 
 __all__ = [
     "RANK_TOLERANCE",
+    "Controller",
+    "ControllerOptions",
     "Feedback",
     "GravityCompensation",
     "Hierarchy",

@@ -15,7 +15,7 @@ RANK_TOLERANCE = 1e-9
 """A direction counts as lost where contacts, higher tasks or a singular leg leave less than this
 fraction of the mobility that it would have without them."""
 
-_FORM_CODE = {"symmetric": 0, "published": 1, "force": 2}
+FORM_CODE = {"symmetric": 0, "published": 1, "force": 2}
 _STEP = 1e-5
 
 
@@ -174,7 +174,7 @@ def _solve(robot: Robot, hierarchy: Hierarchy, stack: Stack) -> tuple[Array, ...
         stack.J_t,
         hierarchy.gain(robot),
         np.array(hierarchy.levels(robot)),
-        _FORM_CODE[hierarchy.form],
+        FORM_CODE[hierarchy.form],
         hierarchy.task_inertia is TaskInertia.LAMBDA_STAR,
         RANK_TOLERANCE,
         allocate(nv, n, c, m=m),
