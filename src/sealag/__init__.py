@@ -11,16 +11,17 @@ __version__ = "0.1.0"
 _HOME = {
     "load": "sealag.design",
     "certify": "sealag.design",
-    "simulate": "sealag.simulation",
+    "simulate": "sealag.design",
     "Controller": "sealag.whole_body",
     "SealagError": "sealag.errors",
 }
 
-__all__ = ["SealagError", "__version__", "certify", "load"]
+__all__ = ["Controller", "SealagError", "__version__", "certify", "load", "simulate"]
 
 if TYPE_CHECKING:
-    from sealag.design import certify, load
+    from sealag.design import certify, load, simulate
     from sealag.errors import SealagError
+    from sealag.whole_body import Controller
 
 
 def __getattr__(name: str) -> Any:

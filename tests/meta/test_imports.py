@@ -9,11 +9,14 @@ HEAVY = ("pinocchio", "numba", "cvxpy", "scipy", "matplotlib", "plotly", "numpy"
 
 
 def _loaded(code: str) -> set[str]:
-    program = f"import sys\n{code}\nprint(','.join(m for m in {HEAVY!r} if m in sys.modules))"
+    program = (
+        f"import sys\n{code}\nprint('loaded:' + ','.join(m for m in {HEAVY!r} if m in sys.modules))"
+    )
     out = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
     )
-    return set(out.stdout.strip().splitlines()[-1].split(",")) - {""}
+    last = out.stdout.strip().splitlines()[-1]
+    return set(last.removeprefix("loaded:").split(",")) - {""}
 
 
 def test_help_imports_nothing_heavy() -> None:

@@ -87,6 +87,36 @@ def verify(
 
 
 @app.command()
+def simulate(
+    project: Project,
+    scenario: Annotated[
+        str | None, typer.Option("--scenario", help="regulate, track, drop or balance.")
+    ] = None,
+    duration: Annotated[float | None, typer.Option("--duration", help="Seconds.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Of jitter and losses.")] = None,
+    delay_scale: Annotated[
+        float, typer.Option("--delay-scale", help="Factor on both round trips.")
+    ] = 1.0,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Recording; PROJECT.mcap if not given.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run the delayed robot, write a recording and print the energy audit."""
+    from sealag.cli._simulate import simulate_project
+
+    simulate_project(
+        project,
+        scenario,
+        duration=duration,
+        seed=seed,
+        delay_scale=delay_scale,
+        out=out,
+        as_json=as_json,
+    )
+
+
+@app.command()
 def paper(
     out: Annotated[Path, typer.Option("--out", help="Folder for page and CSVs.")] = Path(
         "out/paper"

@@ -186,7 +186,7 @@ def measured(samples: ArrayLike, *, period: float, quantile: float = 1.0) -> Tab
     if not (math.isfinite(period) and period > 0.0) or not 0.0 < quantile <= 1.0:
         raise InputError("Measured delays need a positive period and a quantile in (0, 1].")
     cut = float(np.quantile(values, quantile)) if quantile < 1.0 else np.inf
-    return Table(time=np.asarray(np.arange(len(values)) * period, dtype=np.float64), delay=np.minimum(values, cut))
+    return Table(time=np.arange(len(values)) * period, delay=np.minimum(values, cut))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,7 @@ from sealag.design._certify import (
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
 from sealag.design._project import System, load, resolve_project
+from sealag.design._simulate import simulate
 from sealag.design._starter import starter_project
 
 __all__ = [
@@ -26,5 +27,6 @@ __all__ = [
     "published_bounds",
     "resolve_project",
     "save_motion",
+    "simulate",
     "starter_project",
 ]

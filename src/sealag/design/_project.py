@@ -10,6 +10,7 @@ import numpy as np
 
 from sealag.actuation import Actuators, actuators
 from sealag.delay import Constant, Delays, DelaySignal, Sinusoid, Table, measured
+from sealag.design._schema import Project, SimulationSection
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
 from sealag.passivity import Criterion
 from sealag.robot import Contact, ContactKind, Motion, Robot, load_robot, resolve_urdf
@@ -46,7 +47,8 @@ class System:
         delays: both loops' delays.
         motion_file: the project's own motion, if it names one.
         sha256: of the project file; empty if the system was built in Python.
-        simulation: the project's [simulation] table, as read.
+        simulation: the project's [simulation] section.
+        text: the project file's own text, which recordings carry along.
     """
 
     name: str
@@ -61,7 +63,8 @@ class System:
     delays: Delays
     motion_file: Path | None
     sha256: str
-    simulation: dict[str, Any]
+    simulation: SimulationSection
+    text: str
 
     def still(self) -> Motion:
         """Return the posture as a motion of one instant."""
@@ -113,7 +116,7 @@ def load(path: str | Path) -> System:
     content = _read(path)
     project = parse_project(content, path)
     try:
-        return _system(project, path, hashlib.sha256(content).hexdigest())
+        return _system(project, path, content.decode("utf-8"))
     except (ProjectError, FileError):
         raise
     except SealagError as error:
@@ -149,8 +152,6 @@ def parse_project(content: bytes, path: Path) -> Any:
     """
     from pydantic import ValidationError
 
-    from sealag.design._schema import Project
-
     try:
         data = tomllib.loads(content.decode("utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
@@ -183,7 +184,7 @@ def _first_problem(problems: list[Any], path: Path) -> str:
     return f"{path}: {key} is {shown}; {need}{unit}.{rest}"
 
 
-def _system(project: Any, path: Path, digest: str) -> System:
+def _system(project: Any, path: Path, text: str) -> System:
     folder = path.parent
     robot = load_robot(
         resolve_urdf(project.robot.urdf, relative_to=folder),
@@ -217,8 +218,9 @@ def _system(project: Any, path: Path, digest: str) -> System:
         criterion=Criterion(project.controller.criterion),
         delays=_delays(project.delays, folder),
         motion_file=folder / project.motion.file if project.motion else None,
-        sha256=digest,
-        simulation=dict(project.simulation),
+        sha256=hashlib.sha256(text.encode()).hexdigest(),
+        simulation=project.simulation,
+        text=text,
     )
 
 

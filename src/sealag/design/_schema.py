@@ -1,6 +1,6 @@
 """What a project file may say: one class a section, every key with its unit in its name or here."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
@@ -141,6 +141,34 @@ class MotionSection(Section):
     file: str
 
 
+class PushSection(Section):
+    """[[simulation.pushes]]: a constant force on a frame, world axes"""
+
+    frame: str
+    force_n: Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+    start_s: NotNegative
+    duration_s: Positive
+
+
+class SimulationSection(Section):
+    """[simulation]: how `sealag simulate` runs the design"""
+
+    scenario: Literal["regulate", "track", "drop", "balance"] = "regulate"
+    duration_s: Positive = 2.0
+    physics_step_ms: Annotated[FiniteFloat, Field(gt=0, le=10)] = 1.0
+    central_period_ms: Annotated[FiniteFloat, Field(gt=0, le=100)] = 1.0
+    friction: Positive = 0.8
+    foot_half_length: Positive = 0.1
+    foot_half_width: Positive = 0.06
+    drop_height: NotNegative = 0.03
+    track_amplitude: NotNegative = 0.02
+    track_frequency_hz: Positive = 0.5
+    jitter_ms: Milliseconds = 0.0
+    packet_loss: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
+    seed: Annotated[int, Field(ge=0)] = 0
+    pushes: list[PushSection] = []
+
+
 class Project(Section):
     """A whole project file."""
 
@@ -152,4 +180,4 @@ class Project(Section):
     tasks: Annotated[list[TaskSection], Field(min_length=1)]
     delays: DelaysSection
     motion: MotionSection | None = None
-    simulation: dict[str, Any] = {}
+    simulation: SimulationSection = SimulationSection()

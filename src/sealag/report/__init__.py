@@ -4,6 +4,7 @@ from sealag.report._mcap import McapRecorder, RecordingFile, Signal, read_record
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page, write_text
 from sealag.report._paper_page import write_paper_page
 from sealag.report._plots import plot_figure_4, plot_walk_bounds
+from sealag.report._recording import write_run
 
 __all__ = [
     "Cell",
@@ -20,5 +21,6 @@ __all__ = [
     "read_recording",
     "render_page",
     "write_paper_page",
+    "write_run",
     "write_text",
 ]

@@ -87,6 +87,15 @@ class Robot:
         """Return new memory for repeated evaluation, one for each thread."""
         return Workspace(self._model, nv_base=self.nv_base)
 
+    def workspace_at(self, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
+        """Return the robot's own scratch memory, evaluated; the next call of it overwrites it.
+
+        Args:
+            q: (nq,).
+            v: (nv,); at rest if None.
+        """
+        return self._at(q, v)
+
     def _at(self, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
         if not self._scratch:
             self._scratch.append(self.workspace())

@@ -20,6 +20,8 @@ from sealag.whole_body._tasks import (
     TaskKind,
 )
 
+_SETTLE = 5  # iterations for q̄(θ) of the true state, where only the storage is wanted
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerOptions:
@@ -149,22 +151,34 @@ class Controller:
             out += self._actuators.motor_damping * wanted
 
     def storage(self, t: float, measurement: Measurement) -> float:
-        """Return V_3 (and the tank's energy) in J, with the stiffness frozen where it is.
+        """Return V_3, the potential of the command, and the tank's energy, J.
+
+        Task stiffness is frozen where it is. For q̄(θ) the potential is that of the law at q̄ plus
+        ½ lᵀ K⁻¹ l, whose gradient in θ is l(q̄(θ)).
 
         Args:
             t: instant at which the references are taken, s.
             measurement: the true state then.
         """
-        joints = measurement.q_joint
-        if self.options.feedback is not Feedback.JOINT:
-            joints = measurement.theta
+        feedback, scratch = self.options.feedback, np.zeros(self._robot.n)
         offset = self._reference(t)[0] if self._reference else None
-        scratch = np.zeros(self._robot.n)
+        joints = measurement.q_joint if feedback is Feedback.JOINT else measurement.theta
+        if feedback in (Feedback.STATIC_JOINT, Feedback.STATIC_JOINT_TANK):
+            sag = self._sag.copy()
+            for _ in range(_SETTLE):
+                self._law(measurement, measurement.theta + sag, offset, scratch)
+                sag = -scratch / self._actuators.spring_stiffness
+            joints = measurement.theta + sag
         self._law(measurement, joints, offset, scratch)
-        potential = 0.5 * float(self._error @ self._space.stiffness @ self._error)
+        error = self._error
+        if feedback is Feedback.STATIC_JOINT_TANK and self._x_hat is not None:
+            error = -self._x_hat
+        potential = 0.5 * float(error @ self._space.stiffness @ error)
         if self.options.gravity is GravityCompensation.PLANNED:
             potential -= float(self._planned_gravity @ joints)
-        if self.options.feedback is Feedback.STATIC_JOINT_TANK:
+        if feedback is Feedback.STATIC_JOINT:
+            potential += 0.5 * float(scratch @ (scratch / self._actuators.spring_stiffness))
+        if feedback is Feedback.STATIC_JOINT_TANK:
             potential += self._energy
         return potential
 

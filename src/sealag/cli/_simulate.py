@@ -1,0 +1,120 @@
+"""`sealag simulate`: run, record, and account for the energy."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import sealag
+from sealag.cli._app import show_json
+from sealag.design import load, resolve_project, simulate
+from sealag.errors import InputError
+from sealag.report import write_run
+from sealag.simulation import Run
+
+
+def simulate_project(
+    project: str,
+    scenario: str | None,
+    *,
+    duration: float | None,
+    seed: int | None,
+    delay_scale: float,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Run a scenario with a progress bar, write the recording and show the audit."""
+    system = load(project)
+    length = system.simulation.duration_s if duration is None else duration
+    if not (np.isfinite(length) and length > 0.0):
+        raise InputError(f"--duration is {length}; a positive time in s is needed.")
+    run = _with_progress(
+        length,
+        lambda progress: simulate(
+            system,
+            scenario=scenario,
+            duration=length,
+            seed=seed,
+            delay_scale=delay_scale,
+            progress=progress,
+        ),
+    )
+    path = out or Path(f"{resolve_project(project).stem}.mcap")
+    write_run(run, system.robot, path, project=system.text, version=sealag.__version__)
+    answer = summary(run, path)
+    if as_json:
+        show_json(answer)
+    else:
+        _show(run, answer)
+    if run.outcome.value == "interrupted":
+        raise KeyboardInterrupt
+
+
+def _with_progress(length: float, call: Any) -> Run:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(file=sys.stderr)
+    if not console.is_terminal:
+        return call(None)
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("simulating", total=length)
+        return call(lambda t: bar.update(task, completed=t))
+
+
+def summary(run: Run, path: Path) -> dict[str, Any]:
+    """Return what a run's JSON answer holds.
+
+    Args:
+        run: the run.
+        path: its recording.
+    """
+    books = run.audit
+    joint, central = books.joint_side, books.controller_side
+    return {
+        "outcome": run.outcome.value,
+        "message": run.message,
+        "duration_s": float(run.time[-1]),
+        "seed": run.seed,
+        "recording": str(path),
+        "largest_joint_speed_rad_s": float(np.abs(run.theta_dot).max()),
+        "largest_spring_torque_nm": float(np.abs(run.tau_sea).max()),
+        "measurement_age_s": float(run.measurement_age.max()),
+        "command_age_s": float(run.command_age.max()),
+        "energy_residual_j": float(np.abs(books.residual).max()),
+        "energy_throughput_j": float(books.throughput[-1]),
+        "joint_side_passive": joint.passive,
+        "controller_side_passive": central.passive if central else None,
+        "controller_side_slack_j": float(central.slack.min()) if central else None,
+        "first_violation_s": central.first_violation if central else None,
+        "violating_joint": central.joint if central else None,
+        "touchdowns": sum(event.kind.value == "touchdown" for event in run.events),
+    }
+
+
+def _show(run: Run, answer: dict[str, Any]) -> None:
+    books = run.audit
+    print(f"{'outcome':26} {answer['outcome']} {answer['message']}".rstrip())
+    print(f"{'simulated':26} {answer['duration_s']:.3f} s")
+    print(f"{'measurement at most':26} {answer['measurement_age_s'] * 1e3:.2f} ms old")
+    print(f"{'command at most':26} {answer['command_age_s'] * 1e3:.2f} ms old")
+    for name, values in books.stores.items():
+        print(f"{name + ' energy':26} {values[0]:.4f} J at first, {values[-1]:.4f} J at last")
+    for name, works in books.joint_flows.items():
+        print(f"{name + ' work':26} {float(works[-1].sum()):.4f} J")
+    print(
+        f"{'first law':26} open by {answer['energy_residual_j']:.2e} J of "
+        f"{answer['energy_throughput_j']:.4g} J moved"
+    )
+    print(f"{'joint side':26} {'passive' if answer['joint_side_passive'] else 'not passive'}")
+    if answer["controller_side_passive"] is not None:
+        word = "passive" if answer["controller_side_passive"] else "not passive"
+        where = ""
+        if answer["first_violation_s"] is not None:
+            where = (
+                f" by {-answer['controller_side_slack_j']:.1e} J, first at "
+                f"{answer['first_violation_s']:.3f} s, {answer['violating_joint']}"
+            )
+        print(f"{'controller side':26} {word}{where}")
+    print(f"{'recording':26} {answer['recording']}")

@@ -1,0 +1,180 @@
+"""A design in the simulator: regulate, track, drop and balance."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from sealag.design._project import System
+from sealag.errors import InputError
+from sealag.robot import ContactKind
+from sealag.simulation import (
+    Clock,
+    FallLimits,
+    Foot,
+    Network,
+    Push,
+    Run,
+    Scene,
+    closed_loop,
+    require_hold,
+)
+from sealag.typing import Array
+from sealag.whole_body import Controller, ControllerOptions, TaskKind, TickController
+
+_FALL = FallLimits()
+
+
+def simulate(
+    system: System,
+    *,
+    scenario: str | None = None,
+    duration: float | None = None,
+    seed: int | None = None,
+    delay_scale: float = 1.0,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Run a design's whole-body controller on the delayed robot, with contacts and energy audit.
+
+    Scenarios: `regulate` holds the posture while the project's pushes act; `balance` does so with
+    a push of 5 % of the weight for 0.1 s if the project has none; `track` moves the first task's
+    first row as a sinusoid; `drop` begins above the ground with the springs at rest.
+
+    Args:
+        system: the design.
+        scenario: one of the four; the project's if None.
+        duration: s; the project's if None.
+        seed: of jitter and losses; the project's if None.
+        delay_scale: factor on both round trips.
+        progress: called with the simulated time.
+
+    Returns:
+        The run; a fall or divergence is its named outcome.
+
+    Raises:
+        InputError: the scenario is unknown, the duration is no time, a foot begins inside the
+            ground, or the torque limits cannot hold the posture.
+    """
+    setting = system.simulation
+    kind = scenario or setting.scenario
+    if kind not in ("regulate", "track", "drop", "balance"):
+        raise InputError(f"The scenario is {kind!r}; it must be regulate, track, drop or balance.")
+    feet = _feet(system)
+    q = _on_ground(system)
+    scene = Scene(feet=feet, pushes=_pushes(system, kind), fall=_FALL)
+    if system.robot.floating_base and system.contacts:
+        require_hold(
+            system.robot,
+            q,
+            feet,
+            ground=scene.ground,
+            torque_limit=system.actuators.torque_limit,
+        )
+    controller = _controller(system, kind, q)
+    if kind == "drop" and system.robot.floating_base:
+        q = q.copy()
+        q[2] += setting.drop_height
+    return closed_loop(
+        system.robot,
+        system.actuators,
+        controller,
+        q=q,
+        duration=setting.duration_s if duration is None else duration,
+        network=_network(system, delay_scale),
+        clock=Clock(
+            physics=setting.physics_step_ms * 1e-3, central=setting.central_period_ms * 1e-3
+        ),
+        scene=scene,
+        seed=setting.seed if seed is None else seed,
+        progress=progress,
+    )
+
+
+class _Tracking:
+    """A controller whose reference moves: its potential alone says nothing about passivity."""
+
+    def __init__(self, controller: Controller) -> None:
+        self.reset, self.tick = controller.reset, controller.tick
+
+
+def _controller(system: System, kind: str, q: Array) -> TickController:
+    """The design's controller, holding where it stands or tracking about it."""
+    m = system.hierarchy.levels(system.robot)[-1]
+    w = 2.0 * math.pi * system.simulation.track_frequency_hz
+    size, row = system.simulation.track_amplitude, np.eye(m)[0]
+
+    def wave(t: float) -> tuple[Array, Array]:
+        return size * (1.0 - math.cos(w * t)) / 2.0 * row, size * w * math.sin(w * t) / 2.0 * row
+
+    controller = Controller(
+        system.robot,
+        system.hierarchy,
+        system.actuators,
+        contacts=system.contacts,
+        posture=q,
+        options=ControllerOptions(
+            feedback=system.feedback, gravity=system.gravity, delay_bound=system.delays.d_1
+        ),
+        reference=wave if kind == "track" else None,
+    )
+    return _Tracking(controller) if kind == "track" else controller
+
+
+def _feet(system: System) -> list[Foot]:
+    setting = system.simulation
+    return [
+        Foot(
+            contact=contact,
+            friction=setting.friction,
+            half_length=setting.foot_half_length if contact.kind is ContactKind.SURFACE else 0.0,
+            half_width=setting.foot_half_width if contact.kind is ContactKind.SURFACE else 0.0,
+        )
+        for contact in system.contacts
+    ]
+
+
+def _on_ground(system: System) -> Array:
+    """The posture with its lowest contact frame at height 0."""
+    q = system.posture.copy()
+    if system.robot.floating_base and system.contacts:
+        q[2] -= min(
+            system.robot.frame_placement(contact.frame, q)[1][2] for contact in system.contacts
+        )
+    return q
+
+
+def _pushes(system: System, kind: str) -> list[Push]:
+    pushes = [
+        Push(
+            frame=system.robot.check_frame(push.frame),
+            force=(push.force_n[0], push.force_n[1], push.force_n[2]),
+            start=push.start_s,
+            duration=push.duration_s,
+        )
+        for push in system.simulation.pushes
+    ]
+    if kind == "balance" and not pushes:
+        frames = [t.frame for t in system.hierarchy.tasks if t.frame and t.kind is not TaskKind.COM]
+        frame = frames[0] if frames else system.robot.joints[-1]
+        force = 0.05 * system.robot.mass * 9.81
+        pushes = [Push(frame=frame, force=(force, 0.0, 0.0), start=0.2, duration=0.1)]
+    return pushes
+
+
+def _network(system: System, scale: float) -> Network:
+    if not (math.isfinite(scale) and scale >= 0.0):
+        raise InputError(f"delay_scale is {scale}; it must be 0 or a positive number.")
+    network = Network.from_delays(
+        system.delays,
+        jitter=system.simulation.jitter_ms * 1e-3,
+        loss=system.simulation.packet_loss,
+    )
+    if scale == 1.0:
+        return network
+    stretch = {
+        name: replace(link, delay=replace(link.delay, fraction=scale * link.delay.fraction))
+        for name in ("central_up", "central_down", "embedded_down")
+        if (link := getattr(network, name)) is not None
+    }
+    return replace(network, **stretch)

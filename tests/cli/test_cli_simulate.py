@@ -1,0 +1,94 @@
+"""`sealag simulate`: scenarios, recordings, named ends."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sealag.cli import main
+from sealag.report import read_recording
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", *(str(argument) for argument in arguments)])
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+@pytest.mark.parametrize(
+    ("robot", "scenario"),
+    [("baxter", "balance"), ("anymal", "drop"), ("anymal", "track"), ("talos", "regulate")],
+)
+def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, capsys):
+    out = tmp_path / "run.mcap"
+    code, text, err = run(
+        capsys, EXAMPLES / f"{robot}.toml", "--scenario", scenario, "--duration", "0.5",
+        "--out", out, "--json",
+    )  # fmt: skip
+    answer = json.loads(text)
+    assert (code, err) == (0, "")
+    assert answer["outcome"] == "completed"
+    assert answer["energy_residual_j"] <= 1e-4 * max(answer["energy_throughput_j"], 1e-3)
+    assert answer["joint_side_passive"] is True
+    recording = read_recording(out)
+    joints = recording.signals["/joint_states"]
+    assert joints.time[-1] == pytest.approx(0.5, abs=2e-3)
+    assert np.isfinite(joints.values).all()
+    assert "[robot]" in recording.attachments["project.toml"].decode()
+    assert recording.metadata["outcome"] == "completed"
+    assert {"/tf", "/energy", "/torque/spring", "/delay"} <= set(recording.signals)
+
+
+def test_same_seed_same_run(tmp_path, capsys):
+    text = (EXAMPLES / "baxter.toml").read_text()
+    path = tmp_path / "noisy.toml"
+    path.write_text(text + "\n[simulation]\njitter_ms = 3.0\npacket_loss = 0.1\n")
+    ages = []
+    for seed in ("1", "1", "2"):
+        out = tmp_path / "run.mcap"
+        run(capsys, path, "--scenario", "track", "--duration", "0.1", "--seed", seed, "--out", out)
+        ages.append(read_recording(out).signals["/delay"].values)
+    np.testing.assert_array_equal(ages[0], ages[1])
+    assert not np.array_equal(ages[0], ages[2])
+
+
+def test_a_fall_is_a_named_result(tmp_path, capsys):
+    code, text, _ = run(
+        capsys, "bundled:hume", "--scenario", "balance", "--out", tmp_path / "r.mcap", "--json"
+    )
+    answer = json.loads(text)
+    assert code == 0
+    assert answer["outcome"] == "fell"
+    assert "tilted" in answer["message"]
+    assert read_recording(tmp_path / "r.mcap").complete
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--scenario", "dance"], "scenario"),
+        (["--duration", "0"], "duration"),
+        (["--duration", "nan"], "duration"),
+        (["--delay-scale", "-1"], "delay_scale"),
+    ],
+)
+def test_bad_scenarios_are_named(arguments, word, tmp_path, capsys):
+    out = tmp_path / "r.mcap"
+    code, text, err = run(capsys, EXAMPLES / "anymal.toml", *arguments, "--out", out)
+    assert (code, text) == (2, "")
+    assert word in err
+    assert err.count("\n") == 1
+    assert not out.exists()
+
+
+def test_torque_limits_that_cannot_hold(tmp_path, capsys):
+    text = (EXAMPLES / "anymal.toml").read_text()
+    path = tmp_path / "weak.toml"
+    path.write_text(text.replace("[[contacts]]", "torque_limit = 2.0\n\n[[contacts]]", 1))
+    code, _, err = run(capsys, path, "--out", tmp_path / "r.mcap")
+    assert code == 2
+    assert "cannot hold this posture" in err
