@@ -15,26 +15,47 @@ from sealag.passivity._certificate import (
     read_certificate,
     write_certificate,
 )
-from sealag.passivity._multipliers import joint_multiplier
+from sealag.passivity._multipliers import TaskMultiplier, joint_multiplier, task_multiplier
 from sealag.passivity._multitask import MultitaskBound, max_delay_multitask
+from sealag.passivity._problem import (
+    Factor,
+    MultiplierProblem,
+    Solution,
+    factorise,
+    proven_delays,
+    refuted_delay,
+)
+from sealag.passivity._solvers import ClarabelCvxpy, ClarabelDirect, ClosedForm, Solver
 from sealag.passivity._verify import Check, Verification, verify
 
 __all__ = [
     "Certificate",
     "Check",
+    "ClarabelCvxpy",
+    "ClarabelDirect",
+    "ClosedForm",
     "Criterion",
     "DelayBound",
+    "Factor",
+    "MultiplierProblem",
     "MultitaskBound",
     "Proof",
+    "Solution",
+    "Solver",
     "Status",
+    "TaskMultiplier",
     "Verification",
     "Worst",
+    "factorise",
     "joint_multiplier",
     "limiting_direction",
     "max_delay",
     "max_delay_from_stiffness",
     "max_delay_multitask",
+    "proven_delays",
     "read_certificate",
+    "refuted_delay",
+    "task_multiplier",
     "verify",
     "write_certificate",
 ]
