@@ -18,7 +18,8 @@ from numba import njit
 from sealag.kernels.rigid import backward_solve, cholesky, forward_solve
 
 _CONE = 1e-10  # relative accuracy of the friction cone
-_ITERATIONS = 60
+_ITERATIONS = 200
+_STALE = 1e-4  # relative width of a bracket that has lost its root to another point's change
 
 
 @njit(cache=True)
@@ -91,7 +92,7 @@ def _friction(G, b, owner, size, mu, yielding, f):
             if low[i] == 0.0 and guess < 0.0:
                 guess = 0.0
             yielding[i] = _inside(guess, low[i], high[i], G[r, r])
-            if high[i] - low[i] <= 1e-14 * high[i]:  # moved by the other points: begin again
+            if high[i] - low[i] <= _STALE * high[i]:  # moved by the other points: begin again
                 low[i], high[i] = 0.0, np.inf
         if settled:
             break
