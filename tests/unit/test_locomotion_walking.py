@@ -109,7 +109,7 @@ def test_gait_needs_the_angular_momentum(hume):
     case = WalkCase(terrain=FlatTerrain(), steps=6)
     good = simulate_walk(hume, case)
     poor = simulate_walk(
-        hume, replace(case, options=WalkingOptions(momentum_placement=False, apex_gain=0.0))
+        hume, replace(case, options=WalkingOptions(momentum_placement=False, bias_gain=0.0))
     )
     assert good.is_gait
     assert poor.width_deviation > 1.3 * good.width_deviation

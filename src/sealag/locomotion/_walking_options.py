@@ -86,8 +86,9 @@ class WalkingOptions:
         swing_stiffness: K_x of the swing foot, 1/s².
         momentum_placement: The footstep is placed by the angular momentum about the stance foot
             (legs included), not by the CoM velocity.
-        apex_gain: Share of an apex's relative speed error that is added to the speed asked for,
-            step after step; 0 also leaves out the legs' momentum known at the start.
+        bias_gain: Share of a step's error of apex speed that is corrected in the next, against
+            constant errors as an IMU's tilt; 0 also leaves out the legs' momentum known at the
+            start.
         placement_time: Time constant over which the predicted end of the step is averaged, s.
         placement_freeze: The foothold is fixed this long before touchdown, s.
         early_contact: A foot seen on the ground late in its swing begins the next step.
@@ -114,7 +115,7 @@ class WalkingOptions:
     posture_stiffness: float = 100.0
     swing_stiffness: float = 400.0
     momentum_placement: bool = True
-    apex_gain: float = 0.3
+    bias_gain: float = 0.3
     placement_time: float = 0.05
     placement_freeze: float = 0.05
     early_contact: bool = True

@@ -139,14 +139,14 @@ class Placement:
         if not self._started:
             self._started, self._faster = True, (pendulum - speed) / planned
         elif self._before < 0.0 <= ahead:
-            self._faster += self._options.apex_gain * (planned - speed) / planned
+            self._faster += self._options.bias_gain * (planned - speed) / planned
             self._faster = min(max(self._faster, -_FASTER), _FASTER)
         self._before = ahead
 
     def _place(self, step: StepReferences) -> None:
         """Solve ξ(T) = u + ξ_plan for the foothold u of the next step."""
         plan, side = self.plan, step.outward()
-        speed = 1.0 + (self._faster if self._options.apex_gain > 0.0 else 0.0)
+        speed = 1.0 + (self._faster if self._options.bias_gain > 0.0 else 0.0)
         wanted = (plan.end_forward * speed, -side * plan.end_outward)
         u = [0.0, 0.0]
         for k in range(2):

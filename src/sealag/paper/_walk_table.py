@@ -164,7 +164,7 @@ def ablation_cases(*, steps: int = 7) -> dict[str, WalkCase]:
         "no torque feedback": {"torque_feedback": 0.0},
         "no task damping": {"task_damping": 0.0},
         "footsteps by CoM velocity": {"momentum_placement": False},
-        "no correction of the apex speed": {"apex_gain": 0.0},
+        "no correction of constant errors": {"bias_gain": 0.0},
         "no averaging of the placement": {"placement_time": 0.0},
         "no early touchdown": {"early_contact": False},
     }
