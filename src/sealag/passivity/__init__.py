@@ -15,8 +15,18 @@ from sealag.passivity._certificate import (
     read_certificate,
     write_certificate,
 )
+from sealag.passivity._common import (
+    CommonBound,
+    max_delay_common,
+    max_delay_common_from_stiffness,
+)
 from sealag.passivity._multipliers import TaskMultiplier, joint_multiplier, task_multiplier
 from sealag.passivity._multitask import MultitaskBound, max_delay_multitask
+from sealag.passivity._polytope import (
+    PolytopeBound,
+    max_delay_polytope,
+    max_delay_polytope_from_stiffness,
+)
 from sealag.passivity._problem import (
     Factor,
     MultiplierProblem,
@@ -34,11 +44,13 @@ __all__ = [
     "ClarabelCvxpy",
     "ClarabelDirect",
     "ClosedForm",
+    "CommonBound",
     "Criterion",
     "DelayBound",
     "Factor",
     "MultiplierProblem",
     "MultitaskBound",
+    "PolytopeBound",
     "Proof",
     "Solution",
     "Solver",
@@ -50,8 +62,12 @@ __all__ = [
     "joint_multiplier",
     "limiting_direction",
     "max_delay",
+    "max_delay_common",
+    "max_delay_common_from_stiffness",
     "max_delay_from_stiffness",
     "max_delay_multitask",
+    "max_delay_polytope",
+    "max_delay_polytope_from_stiffness",
     "proven_delays",
     "read_certificate",
     "refuted_delay",

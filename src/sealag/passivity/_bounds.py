@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.passivity._scaling import EPS, inverse_root, scaled_task
+from sealag.passivity._scaling import EPS, inverse_root, scaled_stiffness, scaled_task
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body import StiffnessForm
 
@@ -93,22 +93,8 @@ def max_delay_from_stiffness(
     Raises:
         InputError: a shape does not fit, an entry is not finite, or D_θ is not positive definite.
     """
-    stiffness = np.asarray(F, dtype=float)
-    if stiffness.ndim < 2 or stiffness.shape[-1] != stiffness.shape[-2]:
-        raise InputError(f"F has shape {stiffness.shape}; (…, n, n) is needed.")
-    if not np.isfinite(stiffness).all():
-        raise InputError("F has entries that are not finite.")
-    root, error = inverse_root(D_theta, stiffness.shape[-1])
-    A = root @ stiffness @ np.swapaxes(root, -1, -2)
-    n = stiffness.shape[-1]
-    size2 = np.sum(root**2, axis=(-2, -1))
-    norm_A = np.linalg.norm(A, axis=(-2, -1))
-    if np.ndim(D_theta) == 1:
-        slack = 8.0 * EPS * norm_A
-    else:
-        norm_F = np.linalg.norm(stiffness, axis=(-2, -1))
-        slack = (8.0 * n * EPS + 2.0 * error) * size2 * norm_F
-    return bracket(A, slack, tolerance=tolerance)
+    scaled = scaled_stiffness(F, D_theta)
+    return bracket(scaled.A, scaled.A_error, tolerance=tolerance)
 
 
 def limiting_direction(F: ArrayLike, D_theta: ArrayLike, angle: ArrayLike) -> Array:

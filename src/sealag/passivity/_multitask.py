@@ -10,6 +10,7 @@ from sealag.passivity._bounds import bracket
 from sealag.passivity._problem import (
     MultiplierProblem,
     factorise,
+    lessened,
     proven_delays,
     refuted_delay,
 )
@@ -82,7 +83,7 @@ def max_delay_multitask(
     if StiffnessForm(form) is not StiffnessForm.PUBLISHED:
         # Each A_i is PSD; what gains within rounding of PSD leave negative is taken off.
         lowest = _sum([np.minimum(np.linalg.eigvalsh(A)[..., 0], 0.0) for A in parts])
-        delay = _less(whole.delay, -2.0 * lowest)
+        delay = lessened(whole.delay, -2.0 * lowest)
         method = "symmetric positive semidefinite tasks"
         return _bound(delay, whole.upper, tolerance=tolerance, method=method, reason="")
     each = [bracket(task.A, task.A_error, tolerance=tolerance).delay for task in scaled]
@@ -119,8 +120,8 @@ def _close(
         solution = solver.solve(problem)
         proven = proven_delays(problem, factorise(problem, solution.W))[0]
         refuted = refuted_delay(problem, solution.P)
-        delay[k] = max(delay[k], _less(proven, slack[k]))
-        upper[k] = min(upper[k], _less(refuted, -slack[k]))
+        delay[k] = max(delay[k], lessened(proven, slack[k]))
+        upper[k] = min(upper[k], lessened(refuted, -slack[k]))
         if upper[k] > delay[k] * (1.0 + tolerance):
             reason = f"{solver.name} proved too little at instant {k}: {solution.status}"
     return delay.reshape(shape), upper.reshape(shape), reason
@@ -128,13 +129,6 @@ def _close(
 
 def _sum(arrays: Sequence[Array]) -> Array:
     return np.asarray(sum(np.broadcast_arrays(*arrays)))
-
-
-def _less(delay: Array | float, error: Array | float) -> Array:
-    """The delay whose inverse is larger by an error: 1/d is a norm of the stiffnesses."""
-    with np.errstate(divide="ignore"):
-        inverse = 1.0 / np.asarray(delay, dtype=float)
-        return 1.0 / np.maximum(inverse + error, 0.0)
 
 
 def _bound(

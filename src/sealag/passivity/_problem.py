@@ -200,5 +200,17 @@ def refuted_delay(problem: MultiplierProblem, P: Array | None) -> float:
     return trace / total if total > 0.0 else np.inf
 
 
+def lessened(delay: Array | float, error: Array | float) -> Array:
+    """The delay whose inverse is larger by an error: 1/d is a norm of the stiffnesses.
+
+    Args:
+        delay: (…) s.
+        error: (…) 1/s, bound of the error in the scaled stiffnesses.
+    """
+    with np.errstate(divide="ignore"):
+        inverse = 1.0 / np.asarray(delay, dtype=float)
+        return 1.0 / np.maximum(inverse + error, 0.0)
+
+
 def _norm(array: Array) -> Array:
     return np.linalg.norm(array, axis=(-2, -1))

@@ -22,7 +22,7 @@ class ScaledTask:
         M: (…, n, m) D^-½ J*ᵀ S.
         A: (…, n, n) M J, 1/s; symmetric unless the form is published.
         A_error: (…) norm-wise uncertainty of A.
-        M_error: (…) norm-wise uncertainty of M, times the norm of J.
+        M_error: (…) norm-wise uncertainty of M; that of J is counted here too.
     """
 
     J: Array
@@ -67,10 +67,41 @@ def scaled_task(
     A = M @ scaled
     if kind is not StiffnessForm.PUBLISHED:
         A = _symmetric(A)
-    rounding = size**2 * (8.0 * (m + n) * EPS + 2.0 * root_error) * _norm(S)
+    rounding = size * (8.0 * (m + n) * EPS + 2.0 * root_error) * _norm(S)
     return ScaledTask(
-        J=scaled, M=M, A=A, A_error=rounding + change, M_error=rounding + size**2 * S_error
+        J=scaled,
+        M=M,
+        A=A,
+        A_error=size * rounding + change,
+        M_error=rounding + size * S_error,
     )
+
+
+def scaled_stiffness(F: ArrayLike, D_theta: ArrayLike) -> ScaledTask:
+    """Check a motor-side stiffness and scale it: the task J* = I with M = F.
+
+    Args:
+        F: (…, n, n) delayed stiffness, Nm/rad.
+        D_theta: (n,) or (…, n, n) motor damping, Nms/rad.
+
+    Raises:
+        InputError: a shape does not fit, an entry is not finite, or D_θ is not positive definite.
+    """
+    stiffness = np.asarray(F, dtype=float)
+    if stiffness.ndim < 2 or stiffness.shape[-1] != stiffness.shape[-2] or not stiffness.shape[-1]:
+        raise InputError(f"F has shape {stiffness.shape}; (…, n, n) is needed.")
+    if not np.isfinite(stiffness).all():
+        raise InputError("F has entries that are not finite.")
+    n = stiffness.shape[-1]
+    root, root_error = inverse_root(D_theta, n)
+    J = np.swapaxes(root, -1, -2)
+    M = root @ stiffness
+    A = M @ J
+    if np.ndim(D_theta) == 1:
+        return ScaledTask(J=J, M=M, A=A, A_error=8.0 * EPS * _norm(A), M_error=4.0 * EPS * _norm(M))
+    relative = 8.0 * n * EPS + 2.0 * root_error
+    M_error = relative * _norm(root) * _norm(stiffness)
+    return ScaledTask(J=J, M=M, A=A, A_error=_norm(root) * M_error, M_error=M_error)
 
 
 def _symmetric_stiffness(inertia: Array, gain: Array, J: Array) -> tuple[Array, Array, Array]:
@@ -101,7 +132,9 @@ def _symmetric_stiffness(inertia: Array, gain: Array, J: Array) -> tuple[Array, 
             first = low * _norm(VKXJ[..., :k, :]) + outside * norm_J * norm_KXJ
             change = np.fmin(change, 2.0 * first + norm_K * ZJ**2)
     rounding = 8.0 * m * EPS * trace * norm_K
-    S_error = rounding + norm_K * inside * (2.0 * np.sqrt(trace) + inside)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        Z = np.fmin(inside, blur + delta / np.sqrt(values[..., 0]))
+    S_error = rounding + norm_K * Z * (2.0 * np.sqrt(trace) + Z)
     return _symmetric(X @ K @ X), S_error, change + norm_J**2 * rounding
 
 
