@@ -2,19 +2,45 @@
 
 from sealag.paper._claims import Claim, Verdict
 from sealag.paper._figure4 import CertifiedVariant, Figure4, figure_4, figure_4_claims
+from sealag.paper._figure5 import TorqueTrace, figure_5, figure_5_claims, measured_lag
 from sealag.paper._random_table import RandomPlantTable, random_plant_table
 from sealag.paper._unsafe import UnsafeExample, sea_loop, unsafe_examples
+from sealag.paper._walk import Walk, WalkCase, measure_walk, simulate_walk
+from sealag.paper._walk_errors import SensorNoise
+from sealag.paper._walk_table import (
+    WalkRow,
+    ablation_cases,
+    gain_cases,
+    robustness_cases,
+    rough_terrains,
+    walk_success,
+)
 
 __all__ = [
     "CertifiedVariant",
     "Claim",
     "Figure4",
     "RandomPlantTable",
+    "SensorNoise",
+    "TorqueTrace",
     "UnsafeExample",
     "Verdict",
+    "Walk",
+    "WalkCase",
+    "WalkRow",
+    "ablation_cases",
     "figure_4",
     "figure_4_claims",
+    "figure_5",
+    "figure_5_claims",
+    "gain_cases",
+    "measure_walk",
+    "measured_lag",
     "random_plant_table",
+    "robustness_cases",
+    "rough_terrains",
     "sea_loop",
+    "simulate_walk",
     "unsafe_examples",
+    "walk_success",
 ]

@@ -3,8 +3,9 @@
 from sealag.report._mcap import McapRecorder, RecordingFile, Signal, read_recording
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page, write_text
 from sealag.report._paper_page import write_paper_page
-from sealag.report._plots import plot_figure_4, plot_walk_bounds
+from sealag.report._plots import plot_figure_4, plot_gait, plot_torques, plot_walk_bounds
 from sealag.report._recording import write_run
+from sealag.report._walk_page import figure_5_section, playback, rows_table, walk_section
 
 __all__ = [
     "Cell",
@@ -16,10 +17,16 @@ __all__ = [
     "Signal",
     "Table",
     "Text",
+    "figure_5_section",
+    "playback",
     "plot_figure_4",
+    "plot_gait",
+    "plot_torques",
     "plot_walk_bounds",
     "read_recording",
     "render_page",
+    "rows_table",
+    "walk_section",
     "write_paper_page",
     "write_run",
     "write_text",

@@ -21,6 +21,7 @@ def write_paper_page(
     *,
     unsafe: Sequence[UnsafeExample],
     table: RandomPlantTable,
+    extra: Sequence[Section] = (),
     version: str,
 ) -> Path:
     """Write the page and its CSV files.
@@ -31,6 +32,7 @@ def write_paper_page(
         claims: statements of the paper, checked.
         unsafe: plants on which the published criterion is unsafe.
         table: the random plants.
+        extra: further parts, such as the simulated walk and Fig. 5.
         version: of sealag, for the footer.
 
     Returns:
@@ -48,6 +50,7 @@ def write_paper_page(
         Section(
             anchor="unsafe", title="Where (29) is unsafe", blocks=_unsafe_blocks(unsafe, table)
         ),
+        *extra,
     ]
     lead = (
         "Zhao and Sentis (Humanoids 2016) bound the delay that a whole-body controller of a robot "

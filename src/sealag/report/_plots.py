@@ -1,13 +1,13 @@
 """Plots as SVG markup for pages."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-from sealag.paper import Figure4
+from sealag.paper import Figure4, TorqueTrace, Walk
 from sealag.whole_body import Feedback, StiffnessForm
 
 COLOURS = ("#0b6e99", "#c0561f", "#5b7f2b")
@@ -104,4 +104,57 @@ def plot_walk_bounds(figure: Figure4) -> str:
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.25)
         axes.legend(frameon=False, fontsize=10, ncols=2)
+        return _svg(drawing)
+
+
+def plot_gait(walk: Walk) -> str:
+    """Draw apex speeds and step widths of a walk against its plan.
+
+    Args:
+        walk: the walk.
+
+    Returns:
+        SVG markup.
+    """
+    gait = walk.case.gait
+    with _drawing(7.2, 3.6) as (drawing, axes):
+        widths = np.arange(1, len(walk.step_width) + 1)
+        for colour, x, y, plan, share, label in (
+            (COLOURS[0], walk.apex_step, walk.apex_speed, gait.apex_speed, 0.2, "apex speed (m/s)"),
+            (COLOURS[1], widths, walk.step_width, gait.step_width, 0.25, "step width (m)"),
+        ):
+            axes.plot(x, y, "o-", color=colour, label=label)
+            axes.axhline(plan, ls="--", color=colour, lw=1)
+            axes.axhspan(plan * (1 - share), plan * (1 + share), color=colour, alpha=0.1, lw=0)
+        axes.set_xlabel("step")
+        axes.set_ylim(0.0, 1.4 * gait.apex_speed)
+        axes.legend(frameon=False, ncols=2, fontsize=10)
+        return _svg(drawing)
+
+
+def plot_torques(traces: Sequence[TorqueTrace], joint: int) -> str:
+    """Draw command and spring torque of one joint for the smallest and largest β.
+
+    Args:
+        traces: walks with several β.
+        joint: its place.
+
+    Returns:
+        SVG markup.
+    """
+    with _drawing(7.2, 4.0) as (drawing, axes):
+        for colour, trace in zip(COLOURS, (traces[0], traces[-1]), strict=False):
+            time = trace.walk.run.time
+            pick = slice(0, None, max(1, len(time) // 900))
+            axes.plot(time[pick], trace.command[pick, joint], color=colour, lw=0.7)
+            axes.plot(
+                time[pick], trace.achieved[pick, joint], color=colour, lw=2.0,
+                label=f"β = {trace.beta:g}",
+            )  # fmt: skip
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel("torque (Nm)")
+        limit = 1.6 * max(float(np.abs(t.achieved[:, joint]).max()) for t in traces)
+        axes.set_ylim(-limit, limit)
+        axes.grid(alpha=0.25)
+        axes.legend(frameon=False, fontsize=10)
         return _svg(drawing)
