@@ -212,7 +212,11 @@ def search(
         tolerance: relative distance of the two ends at which to stop.
         solver: where candidates come from.
     """
-    count = len(problem.J)
+    count, m, _ = problem.J.shape
+    if not problem.M.any():
+        small = np.eye(m) / (1.0 + float(np.linalg.norm(problem.J, axis=(1, 2)).max()) ** 2)
+        factor = factorise(problem, small)
+        return Search(factor=factor, upper=np.inf, binding=(), rounds=0, status="no stiffness")
     spread = np.linspace(0, count - 1, min(count, _FIRST)).astype(int)
     active = np.unique(np.concatenate([spread, _worst(pointwise, np.inf)]))
     best, best_delay, upper, status, rounds = None, 0.0, np.inf, "", 0

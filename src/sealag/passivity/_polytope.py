@@ -19,6 +19,9 @@ from sealag.passivity._solvers import ClarabelDirect, Solver
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body import StiffnessForm
 
+_LONGEST = 1e6
+"""Where bisection starts, s, if the corners have no stiffness but something around them has."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolytopeBound:
@@ -167,7 +170,10 @@ def _largest(parts: _Windows, factor: Factor) -> tuple[float, Array, Array]:
     """Bisect for the largest d with box + ball ≤ √2 in every window."""
     high = float(estimated_delays(parts.corners, factor).min())
     if np.isinf(high):
-        high = 1.0
+        loaded = parts.rest.M.any() or parts.bend.M.any()
+        if not loaded:
+            return (np.inf, *_sizes(parts, factor, 0.0))
+        high = _LONGEST
     delay, answer = 0.0, (0.0, np.zeros(len(parts.edges)), np.zeros(len(parts.edges)))
     for step in range(50):
         d = high if step == 0 else 0.5 * (delay + high)
