@@ -276,7 +276,7 @@ def test_polytope_contains_the_motion_and_all_mixtures_of_a_window():
 
 def test_polytope_covers_what_a_coarse_motion_leaves_out():
     """Instants of a fine motion that a coarse one skips stay inside, if `between` is asked."""
-    (J, Lambda, K_x), D = motion(3, 801, 3, 3)
+    (J, Lambda, _), D = motion(3, 801, 3, 3)
     F = np.swapaxes(J, 1, 2) @ Lambda @ J * 20.0
     coarse = max_delay_polytope_from_stiffness(F[::8], D, window=1, directions=1)
     R = np.diag(1 / np.sqrt(D))
