@@ -14,13 +14,18 @@ help:
 
 setup: .venv/.ready
 
-.venv/.ready: pyproject.toml constraints.txt
+.venv/.installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "sealag needs Python 3.11 or newer; set PYTHON=/path/to/python3.11")'
 	@echo "[1/3] creating .venv"
 	@$(PYTHON) -m venv .venv
 	@echo "[2/3] installing the packages pinned in constraints.txt"
-	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -q -c constraints.txt -e '.[dev]'
+	@$(BIN)/python -m pip install --disable-pip-version-check -q -c constraints.txt -e '.[dev]'
+	@touch $@
+
+# Numba does not see that a kernel used by another one changed, so all are compiled anew.
+.venv/.ready: .venv/.installed $(wildcard src/sealag/kernels/*.py)
 	@echo "[3/3] compiling kernels"
+	@rm -rf src/sealag/kernels/__pycache__
 	@$(BIN)/python -m sealag.kernels
 	@touch $@
 
@@ -34,7 +39,7 @@ lint: setup
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto
 
 bench: setup
 	$(BIN)/python -m bench
