@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.passivity._bounds import bracket
+from sealag.passivity._bounds import DelayBound, bracket
 from sealag.passivity._problem import (
     Factor,
     MultiplierProblem,
@@ -16,7 +16,7 @@ from sealag.passivity._problem import (
     proven_delays,
     refuted_delay,
 )
-from sealag.passivity._scaling import ScaledTask, scaled_stiffness, scaled_task
+from sealag.passivity._scaling import EPS, ScaledTask, scaled_stiffness, scaled_task
 from sealag.passivity._solvers import ClarabelDirect, Solver
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body import StiffnessForm
@@ -92,8 +92,7 @@ def max_delay_common(
     with np.errstate(divide="ignore"):
         pointwise = 1.0 / np.sum(np.broadcast_arrays(*(1.0 / delay for delay in parts)), axis=0)
     if len(scaled) > 1 and StiffnessForm(form) is not StiffnessForm.PUBLISHED:
-        whole = problem.M @ problem.J
-        pointwise = bracket(whole, np.full(len(whole), slack), tolerance=1e-6).delay
+        pointwise = lessened(_together(problem).delay, slack)
     return _common(problem, slack, np.broadcast_to(pointwise, len(problem.J)), tolerance, solver)
 
 
@@ -155,6 +154,13 @@ def stacked_problem(tasks: Sequence[ScaledTask]) -> tuple[MultiplierProblem, flo
     return stacked, slack
 
 
+def _together(problem: MultiplierProblem) -> DelayBound:
+    """1 / w(Σ A_i) at each instant, which no multiplier exceeds."""
+    _, m, n = problem.J.shape
+    sizes = np.linalg.norm(problem.J, axis=(1, 2)) * np.linalg.norm(problem.M, axis=(1, 2))
+    return bracket(problem.M @ problem.J, 4.0 * (m + n) * EPS * sizes, tolerance=1e-6)
+
+
 def _common(
     problem: MultiplierProblem,
     slack: float,
@@ -167,7 +173,7 @@ def _common(
     chosen = solver if solver is not None else ClarabelDirect()
     found = search(problem, pointwise, tolerance=tolerance, solver=chosen)
     proven = float(proven_delays(problem, found.factor).min())
-    upper = max(found.upper, proven)
+    upper = min(found.upper, float(_together(problem).upper.min()))
     closed = upper <= proven * (1.0 + tolerance) or np.isinf(proven)
     delay = float(lessened(proven, slack))
     return CommonBound(
