@@ -43,7 +43,7 @@ def _places(proof):
 
 
 def inequality_holds(data):
-    """The block matrix's lowest eigenvalue, by NumPy alone; a changed Y may still be a multiplier."""
+    """Whether a changed Y is still a multiplier, by NumPy alone."""
     proof, D = data["proofs"][0], np.diag(data["D_theta"])
     F, Y, d = np.array(proof["F"]), np.array(proof["Y"]), proof["delay_s"]
     block = np.block([[2 * D - Y, d * F], [d * F.T, Y]])

@@ -51,7 +51,8 @@ def transparency(actuators: Actuators, *, delay: float = 0.0) -> Transparency:
     """
     K, B_s, D = actuators.spring_stiffness, actuators.shaped_inertia, actuators.motor_damping
     half = D**2 / (2.0 * B_s**2) - K / B_s
-    squared = -half + np.sqrt(half**2 + (K / B_s) ** 2)
+    root = np.sqrt(half**2 + (K / B_s) ** 2)
+    squared = np.where(half > 0.0, (K / B_s) ** 2 / (root + np.abs(half)), root - half)
     lag = -np.unwrap(np.angle(torque_transfer(actuators, [1e-3, 1.0], delay=delay)), axis=0)[1]
     return Transparency(
         bandwidth=np.sqrt(squared) / (2.0 * np.pi),

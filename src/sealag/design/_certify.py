@@ -176,7 +176,7 @@ def certified_bounds(stack: WholeBodyStack, system: System) -> Bounds:
     crooked = good & ~(stack.asymmetry <= ASYMMETRY_TOLERANCE)
     if crooked.any():
         source = (
-            "gravity compensation where the contacts leave more motions than actuators"
+            "fed-back gravity compensation where contacts or free motions make joints dependent"
             if system.hierarchy.form is not StiffnessForm.PUBLISHED
             else "the stiffness Λ K_x"
         )
