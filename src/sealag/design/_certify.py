@@ -19,6 +19,7 @@ from sealag.passivity import (
     joint_multiplier,
     limiting_direction,
     max_delay,
+    max_delay_common_from_stiffness,
     max_delay_from_stiffness,
     max_delay_multitask,
 )
@@ -128,7 +129,7 @@ def certify(
         first_crossing_s=float(margin.first_crossing) if margin else None,
         unstable_modes=margin.unstable_roots if margin else 0,
         conservatism=margin.delay / max_delay_s if margin and finite else None,
-        common_multiplier_delay_s=None,
+        common_multiplier_delay_s=_common(system, bounds, kind=kind),
         published_max_delay_s=float(published.delay.min()),
         reasons=tuple(reasons),
         assumptions=_assumptions(system, kind, motion),
@@ -240,6 +241,14 @@ def published_bounds(stack: WholeBodyStack, system: System) -> Bounds:
     return Bounds(delay=PROOF_SHARE * delay, upper=many.upper, F=F, angle=whole.angle, reasons=())
 
 
+def _common(system: System, bounds: Bounds, *, kind: Criterion) -> float | None:
+    """Bound with one multiplier for the whole motion; None for one instant or a refused design."""
+    if kind is Criterion.PUBLISHED or len(bounds.delay) == 1 or bounds.reasons:
+        return None
+    found = max_delay_common_from_stiffness(bounds.F, system.actuators.motor_damping)
+    return float(found.delay)
+
+
 def _local(
     system: System, motion: Motion, stack: WholeBodyStack, *, instant: int
 ) -> tuple[DelayMargin | None, bool | None]:
@@ -298,7 +307,7 @@ def _proofs(
 def _assumptions(system: System, criterion: Criterion, motion: Motion) -> tuple[str, ...]:
     said = [
         "coefficients are frozen at each instant (quasi-static: the multiplier may differ from "
-        "instant to instant)",
+        "instant to instant; `common_multiplier_delay_s` is the bound with a single one)",
         "the embedded motor damping D_θ acts without delay",
         f"d_1 is at most {system.delays.d_1 * 1e3:.3f} ms; it may vary below that",
         "contacts neither slip nor lift off",

@@ -36,6 +36,13 @@ from sealag.passivity._problem import (
     refuted_delay,
 )
 from sealag.passivity._solvers import ClarabelCvxpy, ClarabelDirect, ClosedForm, Solver
+from sealag.passivity._storage import (
+    DelayStorage,
+    delay_storage,
+    link_storage,
+    motor_storage,
+    task_storage,
+)
 from sealag.passivity._verify import Check, Verification, verify
 
 __all__ = [
@@ -47,6 +54,7 @@ __all__ = [
     "CommonBound",
     "Criterion",
     "DelayBound",
+    "DelayStorage",
     "Factor",
     "MultiplierProblem",
     "MultitaskBound",
@@ -58,9 +66,11 @@ __all__ = [
     "TaskMultiplier",
     "Verification",
     "Worst",
+    "delay_storage",
     "factorise",
     "joint_multiplier",
     "limiting_direction",
+    "link_storage",
     "max_delay",
     "max_delay_common",
     "max_delay_common_from_stiffness",
@@ -68,10 +78,12 @@ __all__ = [
     "max_delay_multitask",
     "max_delay_polytope",
     "max_delay_polytope_from_stiffness",
+    "motor_storage",
     "proven_delays",
     "read_certificate",
     "refuted_delay",
     "task_multiplier",
+    "task_storage",
     "verify",
     "write_certificate",
 ]

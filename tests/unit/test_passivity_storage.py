@@ -1,0 +1,108 @@
+"""Stored energy falls below the bound and rises beyond it, on one-joint plants of THEORY 6b."""
+
+import numpy as np
+import pytest
+
+from sealag.errors import InputError
+from sealag.passivity import (
+    DelayStorage,
+    delay_storage,
+    joint_multiplier,
+    link_storage,
+    max_delay_from_stiffness,
+    motor_storage,
+    task_storage,
+)
+
+K, B_S, D = 350.0, 0.09, 10.0
+STEP = 1e-4
+
+
+def run(M, F, delay, *, duration=6.0):
+    """[q, θ, q̇, θ̇] under −F θ(t − d) from rest at a deflection; delay a whole number of steps."""
+    lag = round(delay / STEP)
+    A = np.zeros((4, 4))
+    A[0, 2] = A[1, 3] = 1.0
+    A[2, :2] = -K / M, K / M
+    A[3] = K / B_S, -K / B_S, 0.0, -D / B_S
+    b = np.array([0.0, 0.0, 0.0, -F / B_S])
+    x = np.array([0.3, 0.3, 0.0, 0.0])
+    rows, theta = [x], [x[1]] * (lag + 1)
+    for _ in range(round(duration / STEP)):
+        old, new = theta[-lag - 1], theta[-lag] if lag else None
+        mid = 0.5 * (old + new)
+
+        def f(x, y):
+            return A @ x + b * y
+
+        k1 = f(x, old)
+        k2 = f(x + STEP / 2 * k1, mid)
+        k3 = f(x + STEP / 2 * k2, mid)
+        k4 = f(x + STEP * k3, new)
+        x = x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        rows.append(x)
+        theta.append(x[1])
+    return np.array(rows)
+
+
+def energy(M, F, delay, states):
+    Y = joint_multiplier([[F]], [D], delay)
+    window = DelayStorage(Y=Y, delay=delay, step=STEP)
+    total = []
+    for q, theta, q_dot, theta_dot in states:
+        V_4 = window.update([theta_dot])
+        total.append(
+            link_storage([[M]], [q_dot], 0.0)
+            + motor_storage([B_S], [theta_dot], [K], tau_sea=[K * (theta - q)])
+            + task_storage([[F]], [theta])
+            + V_4
+        )
+    return np.array(total)
+
+
+@pytest.mark.parametrize(("M", "F"), [(1.0, 100.0), (5.0, 300.0), (0.5, 30.0)])
+def test_energy_never_rises_below_the_bound(M, F):
+    bound = float(max_delay_from_stiffness([[F]], [D]).delay)
+    delay = np.floor(0.999 * bound / STEP) * STEP
+    total = energy(M, F, delay, run(M, F, delay))
+    assert np.diff(total).max() < 1e-6 * total[0]
+    assert total[-1] < 0.7 * total[0]
+
+
+def test_energy_rises_where_the_published_bound_is_unsafe():
+    """q̄(θ) fed back: the motor-side stiffness is K_θ, and (29) allows 0.1 s, the margin 0.0773 s."""
+    M, K_q = 1.0, 100.0
+    K_theta = 1.0 / (1.0 / K_q - 1.0 / K)
+    states = run(M, K_theta, 0.095)
+    total = [
+        link_storage([[M]], [v], 0.0)
+        + motor_storage([B_S], [w], [K], tau_sea=[K * (theta - q)])
+        + task_storage([[K_theta]], [theta])
+        for q, theta, v, w in states
+    ]
+    assert max(total[len(total) // 2 :]) > 2.0 * total[0]
+
+
+def test_window_and_integral_agree():
+    rng = np.random.default_rng(1)
+    t = np.arange(400) * 1e-3
+    w = np.column_stack([np.sin(7 * t), np.cos(11 * t) * t])
+    X = rng.normal(size=(2, 2))
+    Y = X @ X.T
+    window = DelayStorage(Y=Y, delay=0.1, step=1e-3)
+    values = [window.update(row) for row in w]
+    for k in (150, 250, 399):
+        exact = delay_storage(t[: k + 1], w[: k + 1], Y, delay=0.1)
+        assert values[k] == pytest.approx(exact, rel=2e-3)
+    fine = np.arange(40001) * 1e-5
+    w_fine = np.column_stack([np.sin(7 * fine), np.cos(11 * fine) * fine])
+    weight = np.einsum("ki,ij,kj->k", w_fine, Y, w_fine) * np.clip(fine - fine[-1] + 0.1, 0, None)
+    direct = 0.5 / 0.1 * np.sum(weight) * 1e-5
+    assert delay_storage(fine, w_fine, Y, delay=0.1) == pytest.approx(direct, rel=1e-3)
+
+
+def test_too_short_a_history_is_refused():
+    with pytest.raises(InputError, match="history"):
+        delay_storage([0.0, 0.01], [[1.0], [1.0]], [[1.0]], delay=0.1)
+    with pytest.raises(InputError, match="step"):
+        DelayStorage(Y=np.eye(1), delay=1e-4, step=1e-3)
