@@ -69,8 +69,9 @@ class WalkingOptions:
     Attributes:
         preview: Work ahead of the delay: the references are those of the instant at which the
             command will reach the motors.
-        embedded_delay: What the command's way lasts longer than the measurement's, half the mean
-            T_L, s; the measurement's age is known, the rest of the way is taken as long.
+        embedded_delay: What the command's way lasts longer than the measurement's, s: half the
+            mean T_L of the paper, 1.5 ms, and one period of hold. The measurement's age is known;
+            the command's way is taken as that age and this.
         prediction: How the state at that instant is predicted.
         acceleration_feedforward: The tasks' planned accelerations enter the law.
         velocity_feedforward: The embedded damping acts on θ̇ − q̇_d, not on θ̇: D_θ q̇_d is added
@@ -102,7 +103,7 @@ class WalkingOptions:
     """
 
     preview: bool = True
-    embedded_delay: float = 0.0015
+    embedded_delay: float = 0.0025
     prediction: Prediction = Prediction.MODEL
     acceleration_feedforward: bool = True
     velocity_feedforward: bool = True
@@ -117,7 +118,7 @@ class WalkingOptions:
     momentum_placement: bool = True
     bias_gain: float = 0.3
     placement_time: float = 0.05
-    placement_freeze: float = 0.05
+    placement_freeze: float = 0.03
     early_contact: bool = True
     odometry: bool = True
     feedback: Feedback = Feedback.JOINT

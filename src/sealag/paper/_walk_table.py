@@ -185,7 +185,7 @@ def ablation_cases(*, steps: int = 7) -> dict[str, WalkCase]:
 
 
 def gain_cases(*, steps: int = 7) -> dict[str, WalkCase]:
-    """Return the default walk over spring stiffness, α, β and delay.
+    """Return the default walk over spring stiffness, α, β and delay (whose mean is known).
 
     Args:
         steps: Number of steps.
@@ -199,5 +199,6 @@ def gain_cases(*, steps: int = 7) -> dict[str, WalkCase]:
     for beta in (0.1, 0.5, 1.0, 2.0):
         cases[f"β = {beta:g}"] = replace(case, inertia_shaping=beta)
     for scale in (0.0, 1.0, 2.0, 3.0, 4.0):
-        cases[f"delays × {scale:g}"] = replace(case, delay_scale=scale)
+        known = WalkingOptions(embedded_delay=1.5e-3 * scale + 1e-3)
+        cases[f"delays × {scale:g}"] = replace(case, delay_scale=scale, options=known)
     return cases
