@@ -97,7 +97,7 @@ def test_walks_rough_ground_under_delay(hume):
     [WalkingOptions.published(), WalkingOptions(prediction="none"), WalkingOptions(lead=False)],
 )
 def test_no_gait_without_the_means(hume, options):
-    """Negative control: the published law, and the law without prediction or lead, do not have the gait."""
+    """Negative control: the published law, and ours without prediction or lead, have no gait."""
     walk = simulate_walk(hume, WalkCase(terrain=rough_terrain(0), options=options, steps=8))
     assert not walk.is_gait
     assert walk.run.outcome in Outcome
