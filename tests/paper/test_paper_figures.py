@@ -1,0 +1,112 @@
+"""The paper's figures and claims, computed small, with what must come out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sealag.design import load
+from sealag.locomotion import FlatTerrain, paper_terrain, plan_walk, walk_motion
+from sealag.paper import (
+    Verdict,
+    WalkCase,
+    figure_4,
+    figure_4_claims,
+    measured_lag,
+    random_plant_table,
+    simulate_walk,
+    unsafe_examples,
+)
+from sealag.whole_body import Feedback, StiffnessForm
+
+HUME = load("bundled:hume")
+
+
+@pytest.fixture(scope="module")
+def figure():
+    motion = walk_motion(HUME.robot, plan_walk(paper_terrain(), steps=7), rate=50.0)
+    return figure_4(HUME.robot, motion, system=HUME)
+
+
+def test_claims_of_figure_4(figure):
+    verdicts = {claim.key: claim.verdict for claim in figure_4_claims(figure)}
+    assert verdicts == {
+        "alpha": Verdict.CONFIRMED,
+        "abduction": Verdict.CONFIRMED,
+        "stiffness": Verdict.CONFIRMED,
+        "sufficient": Verdict.QUALIFIED,
+    }
+
+
+def test_a_figure_that_falls_contradicts_the_claims(figure):
+    wrong = replace(
+        figure, delay_s=figure.delay_s[::-1, ::-1], stiffness_delay_s=figure.stiffness_delay_s[::-1]
+    )
+    verdicts = {claim.key: claim.verdict for claim in figure_4_claims(wrong)}
+    for key in ("alpha", "abduction", "stiffness"):
+        assert verdicts[key] is Verdict.CONTRADICTED
+
+
+def test_figure_4_is_proportional_to_alpha_and_the_swing_leg_hardly_counts(figure):
+    ratio = figure.delay_s / figure.alpha
+    np.testing.assert_allclose(ratio, ratio[:, :1] * np.ones_like(ratio), rtol=1e-9)
+    np.testing.assert_allclose(figure.both_legs_delay_s, figure.delay_s, rtol=0.02)
+    assert (figure.both_legs_delay_s <= figure.delay_s * (1 + 1e-9)).all()
+
+
+def test_the_printed_law_is_refused_and_the_corrected_one_is_shorter(figure):
+    by = {(v.form, v.feedback): v for v in figure.certified if v.gravity == "planned"}
+    printed = figure.certified[0]
+    assert printed.form is StiffnessForm.PUBLISHED
+    assert "not symmetric" in printed.reason
+    static = by[StiffnessForm.SYMMETRIC, Feedback.STATIC_JOINT].delay_s.min()
+    motor = by[StiffnessForm.SYMMETRIC, Feedback.MOTOR].delay_s.min()
+    assert 0.0 < static < 0.6 * motor
+
+
+def test_unsafe_examples_of_theory_6():
+    examples = unsafe_examples(draws=60)
+    first, second, link = examples[:3]
+    assert first.published_delay_s == pytest.approx(0.1, rel=1e-9)
+    assert first.certified_delay_s == pytest.approx(1 / 14, rel=1e-6)
+    assert first.margin_s == pytest.approx(0.0773, abs=5e-5)
+    assert second.certified_delay_s == pytest.approx(0.00476, abs=5e-6)
+    assert second.margin_s == pytest.approx(0.00476, abs=5e-6)
+    assert link.certified_delay_s is None
+    assert link.margin_s == pytest.approx(0.0745, abs=5e-5)
+    assert all(example.published_is_unsafe for example in examples)
+    assert not any(example.certified_is_unsafe for example in examples)
+    assert len(examples) > 5
+
+
+def test_random_plants_show_the_difference():
+    table = random_plant_table(120, seed=40)
+    assert table.certified_longer == 0
+    assert table.smallest_ratio >= 1.0
+    assert table.published_longer > 5
+    assert table.certified_spoke > 20
+
+
+def test_lag_estimate_finds_a_known_shift():
+    t = np.arange(3000) * 1e-3
+    sent = np.column_stack([np.sin(9 * t) + np.sin(23 * t), np.cos(14 * t)])
+    acting = np.column_stack(
+        [np.sin(9 * (t - 0.0174)) + np.sin(23 * (t - 0.0174)), np.cos(14 * (t - 0.0174))]
+    )
+    assert measured_lag(t, sent, acting) == pytest.approx(0.0174, abs=1e-4)
+    assert measured_lag(t, sent, sent) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_hume_walks_and_the_energy_closes():
+    walk = simulate_walk(HUME, WalkCase(steps=7))
+    assert walk.walked, walk.cause
+    assert walk.is_gait
+    assert walk.run.audit.closure < 1e-4
+    assert walk.run.measurement_age.max() > 0.01
+
+
+def test_a_walk_beyond_its_delay_ends_as_a_named_fall():
+    walk = simulate_walk(HUME, WalkCase(terrain=FlatTerrain(), steps=7, delay_scale=8.0))
+    assert not walk.walked
+    assert walk.run.outcome.value in {"fell", "diverged", "contact_unsolvable", "chattered"}
+    assert str(walk.steps) in walk.cause

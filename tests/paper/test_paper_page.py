@@ -1,0 +1,62 @@
+"""The page is self-contained and says what was computed."""
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+
+from sealag.design import load
+from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+from sealag.paper import (
+    WalkCase,
+    figure_4,
+    figure_4_claims,
+    random_plant_table,
+    simulate_walk,
+    unsafe_examples,
+    walk_success,
+)
+from sealag.report import walk_section, write_paper_page
+
+
+class Links(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.outside, self.anchors, self.ids = [], [], set()
+
+    def handle_starttag(self, tag, attrs):
+        found = dict(attrs)
+        self.ids.add(found.get("id"))
+        for key in ("src", "href"):
+            target = found.get(key) or ""
+            if target.startswith("#"):
+                self.anchors.append(target[1:])
+            elif target and tag != "use":
+                self.outside.append(target)
+
+
+def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
+    system = load("bundled:hume")
+    motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=20.0)
+    figure = figure_4(system.robot, motion, system=system)
+    walk = simulate_walk(system, WalkCase(steps=2))
+    rows = walk_success({"default": WalkCase(steps=1)}, [paper_terrain()])
+    page = write_paper_page(
+        tmp_path, figure, figure_4_claims(figure), unsafe=unsafe_examples(draws=10),
+        table=random_plant_table(30), extra=[walk_section(system.robot, walk, rows, rows)],
+        version="test",
+    )  # fmt: skip
+    text = page.read_text()
+    links = Links()
+    links.feed(text)
+    assert links.outside == []
+    assert set(links.anchors) >= {"claims", "figure4", "certified", "unsafe", "walk"}
+    assert set(links.anchors) - {a for a in links.anchors if a.startswith(("m", "p"))} <= links.ids
+    assert 'name="viewport"' in text
+    assert not re.search(r"https?://(?!www\.w3\.org|purl\.org|creativecommons|matplotlib)", text)
+    assert text.count("<svg") >= 3
+    assert "<canvas" in text
+    assert f"{figure.delay_s[1][3] * 1e3:.1f}" in text
+    csv = np.genfromtxt(tmp_path / "figure4.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(csv["one_leg_delay_s_D10"], figure.delay_s[1], rtol=1e-8)
+    assert len((tmp_path / "figure4_instants.csv").read_text().splitlines()) == len(motion) + 1
