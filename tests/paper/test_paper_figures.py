@@ -15,6 +15,7 @@ from sealag.paper import (
     measured_lag,
     random_plant_table,
     simulate_walk,
+    simulated_motion,
     unsafe_examples,
 )
 from sealag.whole_body import Feedback, StiffnessForm
@@ -103,6 +104,10 @@ def test_hume_walks_and_the_energy_closes():
     assert walk.is_gait
     assert walk.run.audit.closure < 1e-4
     assert walk.run.measurement_age.max() > 0.01
+    motion = simulated_motion(walk.run)
+    assert {c[0].frame for c in motion.contact_sets} == {"left_foot", "right_foot"}
+    switches = np.count_nonzero(np.diff(motion.contact_index))
+    assert walk.steps - 1 <= switches <= walk.steps + 3
 
 
 def test_a_walk_beyond_its_delay_ends_as_a_named_fall():

@@ -13,14 +13,22 @@ from sealag.paper import (
     figure_4_claims,
     figure_5,
     figure_5_claims,
+    gain_cases,
     random_plant_table,
     robustness_cases,
     rough_terrains,
     simulate_walk,
+    simulated_motion,
     unsafe_examples,
     walk_success,
 )
-from sealag.report import figure_5_section, walk_section, write_paper_page, write_run
+from sealag.report import (
+    figure_5_section,
+    limits_section,
+    walk_section,
+    write_paper_page,
+    write_run,
+)
 
 
 def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
@@ -38,13 +46,16 @@ def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
     write_run(walk.run, system.robot, out / "walk.mcap", project=system.text, version=VERSION)
     progress("[5/7] walking over 20 random terrains, with and without noise and model errors")
     robust = walk_success(robustness_cases(steps=7), rough_terrains(20), jobs=2)
-    progress("[6/7] leaving out each means, over 4 terrains; Fig. 5")
+    progress("[6/7] leaving out each means and varying gains and delays, over 4 terrains; Fig. 5")
     ablations = walk_success(ablation_cases(), rough_terrains(4), jobs=2)
+    gains = walk_success(gain_cases(), rough_terrains(4), jobs=2)
+    simulated = figure_4(system.robot, simulated_motion(walk.run), system=system)
     traces = figure_5(system)
     claims = (*figure_4_claims(figure), *figure_5_claims(traces))
     progress("[7/7] writing the page")
     extra = [
         walk_section(system.robot, walk, robust, ablations),
+        limits_section(figure, simulated, gains),
         figure_5_section(traces, system.robot.joints),
     ]
     page = write_paper_page(

@@ -1,7 +1,13 @@
 """The paper's figures and statements, computed here and checked one by one."""
 
 from sealag.paper._claims import Claim, Verdict
-from sealag.paper._figure4 import CertifiedVariant, Figure4, figure_4, figure_4_claims
+from sealag.paper._figure4 import (
+    CertifiedVariant,
+    Figure4,
+    figure_4,
+    figure_4_claims,
+    simulated_motion,
+)
 from sealag.paper._figure5 import TorqueTrace, figure_5, figure_5_claims, measured_lag
 from sealag.paper._random_table import RandomPlantTable, random_plant_table
 from sealag.paper._unsafe import UnsafeExample, sea_loop, unsafe_examples
@@ -41,6 +47,7 @@ __all__ = [
     "rough_terrains",
     "sea_loop",
     "simulate_walk",
+    "simulated_motion",
     "unsafe_examples",
     "walk_success",
 ]

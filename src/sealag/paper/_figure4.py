@@ -7,7 +7,8 @@ import numpy as np
 from sealag.design import System, certified_bounds
 from sealag.paper._claims import Claim, Verdict
 from sealag.passivity import max_delay
-from sealag.robot import Motion, Robot
+from sealag.robot import Contact, Motion, Robot
+from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.whole_body import (
     Feedback,
@@ -256,4 +257,32 @@ def figure_4_claims(figure: Figure4) -> tuple[Claim, ...]:
             verdict=Verdict.QUALIFIED,
             tolerance="an exact delay margin below the published bound counts against it",
         ),
+    )
+
+
+def simulated_motion(run: Run) -> Motion:
+    """Turn a simulated biped walk into a motion with one stance foot at each instant.
+
+    The stance foot is the one that carries more load; in flight the last one stays. Double
+    support, a sixth of the walk, is thus counted for the foot that carries it.
+
+    Args:
+        run: the simulated walk.
+    """
+    load = np.array(
+        [
+            run.contact_force[:, np.array(run.feet) == frame, 2].sum(axis=1)
+            for frame in dict.fromkeys(run.feet)
+        ]
+    )
+    frames = tuple(dict.fromkeys(run.feet))
+    index = np.argmax(load, axis=0)
+    for k in np.flatnonzero(load.max(axis=0) <= 0.0):
+        index[k] = index[k - 1]
+    return Motion(
+        time=run.time,
+        q=run.q,
+        v=run.v,
+        contact_sets=tuple((Contact(frame=frame),) for frame in frames),
+        contact_index=index.astype(np.int64),
     )

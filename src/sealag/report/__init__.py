@@ -5,7 +5,13 @@ from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_
 from sealag.report._paper_page import write_paper_page
 from sealag.report._plots import plot_figure_4, plot_gait, plot_torques, plot_walk_bounds
 from sealag.report._recording import write_run
-from sealag.report._walk_page import figure_5_section, playback, rows_table, walk_section
+from sealag.report._walk_page import (
+    figure_5_section,
+    limits_section,
+    playback,
+    rows_table,
+    walk_section,
+)
 
 __all__ = [
     "Cell",
@@ -18,6 +24,7 @@ __all__ = [
     "Table",
     "Text",
     "figure_5_section",
+    "limits_section",
     "playback",
     "plot_figure_4",
     "plot_gait",
