@@ -70,7 +70,7 @@ def test_energy_never_rises_below_the_bound(M, F):
 
 
 def test_energy_rises_where_the_published_bound_is_unsafe():
-    """q̄(θ) fed back: the motor-side stiffness is K_θ, and (29) allows 0.1 s, the margin 0.0773 s."""
+    """q̄(θ) is fed back: the motor sees K_θ, (29) allows 0.1 s, the margin is 0.0773 s."""
     M, K_q = 1.0, 100.0
     K_theta = 1.0 / (1.0 / K_q - 1.0 / K)
     states = run(M, K_theta, 0.095)

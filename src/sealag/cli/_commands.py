@@ -2,7 +2,6 @@
 
 import os
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from sealag.cli._app import show_json
 from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
 from sealag.errors import FileError, InputError
+from sealag.files import write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 
@@ -27,20 +27,8 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     text = starter_project(urdf, floating_base=floating_base).replace(
         f'urdf = "{urdf}"', f'urdf = "{where}"'
     )
-    _write(path, text)
+    write_text(path, text)
     return path
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def _motion(system: System, path: Path | None) -> Motion | None:

@@ -1,7 +1,5 @@
 """Motions as tables with named columns: CSV, NPZ or Parquet."""
 
-import os
-import tempfile
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -9,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sealag.errors import FileError, MotionError
+from sealag.files import written_whole
 from sealag.robot import Contact, Motion, Robot
 from sealag.typing import Array
 
@@ -190,23 +189,16 @@ def save_motion(motion: Motion, robot: Robot, path: str | Path) -> None:
     table = motion_table(motion, robot)
     if path.suffix.lower() not in {".csv", ".npz", ".parquet"}:
         raise MotionError(f"{path}: motions end in .csv, .npz or .parquet.")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
-        with os.fdopen(handle, "wb") as file:
-            match path.suffix.lower():
-                case ".npz":
-                    np.savez_compressed(file, allow_pickle=False, **table)
-                case ".csv":
-                    rows = np.column_stack(list(table.values()))
-                    head = ",".join(table)
-                    np.savetxt(file, rows, delimiter=",", header=head, comments="", fmt="%.17g")
-                case _:
-                    import pyarrow
-                    from pyarrow import parquet
+    with written_whole(path) as file:
+        match path.suffix.lower():
+            case ".npz":
+                np.savez_compressed(file, allow_pickle=False, **table)
+            case ".csv":
+                rows = np.column_stack(list(table.values()))
+                head = ",".join(table)
+                np.savetxt(file, rows, delimiter=",", header=head, comments="", fmt="%.17g")
+            case _:
+                import pyarrow
+                from pyarrow import parquet
 
-                    parquet.write_table(pyarrow.table(table), file)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
+                parquet.write_table(pyarrow.table(table), file)

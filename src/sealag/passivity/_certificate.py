@@ -2,8 +2,6 @@
 
 import json
 import math
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
@@ -11,6 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from sealag.errors import CertificateError, FileError
+from sealag.files import write_text
 
 SCHEMA = "sealag-certificate/1"
 LARGEST_BYTES = 500_000_000
@@ -184,15 +183,8 @@ def write_certificate(certificate: Certificate, path: Path) -> None:
     Raises:
         FileError: it cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(certificate.to_json_dict(), file, allow_nan=False, indent=1)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
+    text = json.dumps(certificate.to_json_dict(), allow_nan=False, indent=1)
+    write_text(path, text)
 
 
 def read_certificate(path: Path) -> dict[str, Any]:

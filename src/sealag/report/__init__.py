@@ -1,7 +1,7 @@
 """What a person looks at: plots, self-contained HTML pages and MCAP recordings."""
 
 from sealag.report._mcap import McapRecorder, RecordingFile, Signal, read_recording
-from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page, write_text
+from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page
 from sealag.report._paper_page import write_paper_page
 from sealag.report._plots import plot_figure_4, plot_gait, plot_torques, plot_walk_bounds
 from sealag.report._recording import write_run
@@ -36,5 +36,4 @@ __all__ = [
     "walk_section",
     "write_paper_page",
     "write_run",
-    "write_text",
 ]

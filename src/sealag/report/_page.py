@@ -1,13 +1,8 @@
 """A self-contained HTML page from sections of text, tables and figures."""
 
-import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
-
-from sealag.errors import FileError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,24 +132,3 @@ def _with_cells(block: Text | Figure | Raw | Table) -> Text | Figure | Raw | Tab
         for row in block.rows
     ]
     return Table(columns=block.columns, rows=rows, caption=block.caption, stack=block.stack)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file through a temporary name, so that a reader never sees half of it.
-
-    Args:
-        path: where the file goes; its folder is made if needed.
-        text: what it holds, written as UTF-8.
-
-    Raises:
-        FileError: the folder or the file cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from sealag.files import write_text
 from sealag.paper import Claim, Figure4, RandomPlantTable, UnsafeExample
-from sealag.report._page import Cell, Figure, Section, Table, Text, render_page, write_text
+from sealag.report._page import Cell, Figure, Section, Table, Text, render_page
 from sealag.report._plots import plot_figure_4, plot_walk_bounds
 
 TITLE = "Passivity of time-delayed whole-body control with series elastic actuation, recomputed"
