@@ -81,10 +81,10 @@ def model_xml(
     impedance: float = 0.9999,
     soft: float = 5e-4,
 ) -> str:
-    """Return the MJCF of a robot: feet held by equalities, or touching a plane with friction."""
+    """Return the MJCF of a robot: feet held by equalities, or each touching its plane of ground."""
     model = robot._model
     sites = []
-    for foot in feet:
+    for k, foot in enumerate(feet):
         frame = model.frames[model.getFrameId(foot)]
         sites.append((frame.parentJoint, f'<site name="{foot}" {_pose(frame.placement)}/>'))
         if friction is not None:
@@ -93,7 +93,7 @@ def model_xml(
                 (
                     frame.parentJoint,
                     f'<geom name="{foot}" type="sphere" size="{radius}" pos="{place}" '
-                    f'contype="1" conaffinity="0" mass="0"/>',
+                    f'contype="{2**k}" conaffinity="0" mass="0"/>',
                 )
             )
     base = [i for i in range(1, model.njoints) if model.parents[i] == 0]
@@ -120,17 +120,18 @@ def model_xml(
     )
     floor = ""
     if friction is not None:
-        floor = (
-            f'<geom name="floor" type="plane" size="9 9 1" friction="{friction} 0 0" condim="3" '
-            f'contype="0" conaffinity="1" priority="1" solref="{soft} 1" '
-            f'solimp="0.9999 0.9999 0.0001"/>'
+        floor = "".join(
+            f'<geom name="ground_{f}" type="plane" size="9 9 1" friction="{friction} 0 0" '
+            f'condim="{3 if friction else 1}" contype="0" conaffinity="{2**k}" priority="1" '
+            f'solref="{soft} 1" solimp="{impedance} {impedance} 0.0001"/>'
+            for k, f in enumerate(feet)
         )
     contact = "enable" if friction is not None else "disable"
     return (
         f'<mujoco><compiler angle="radian" boundmass="0" boundinertia="0" balanceinertia="false"/>'
         f'<option timestep="{step:.17g}" integrator="{integrator}" gravity="0 0 -9.81" '
         f'tolerance="1e-13" iterations="200" cone="elliptic" impratio="100">'
-        f'<flag contact="{contact}"/></option>'
+        f'<flag contact="{contact}" midphase="disable"/></option>'
         f"<worldbody>{floor}{anchors}{bodies}{rotors}</worldbody><tendon>{springs}</tendon>"
         f"<equality>{held}</equality><actuator>{motors}</actuator></mujoco>"
     )
@@ -186,6 +187,13 @@ class MujocoRobot:
         place = self.data.site(foot).xpos.copy()
         self.model.site_pos[self.model.site("anchor_" + foot).id] = place
         self.data.eq_active[self.model.equality(foot).id] = 1
+
+    def tilt_ground(self, foot: str, point, rotation) -> None:
+        """Let the ground below a foot be the plane through a point, normal to the third column."""
+        ground = self.model.geom("ground_" + foot).id
+        self.model.geom_sameframe[ground] = 0
+        self.model.geom_pos[ground] = point
+        mujoco.mju_mat2Quat(self.model.geom_quat[ground], np.ascontiguousarray(rotation).ravel())
 
     def fill_delay(self, command) -> None:
         """Let the actuators' past be a constant command."""

@@ -84,6 +84,7 @@ class WalkCase:
         pushes: Disturbing forces.
         seed: Of noise and model errors.
         physics: Step of the plant, s.
+        embedded: Period at which the drives look for commands, s; 0 is each physics step.
         log_period: Between logged instants, s.
     """
 
@@ -101,6 +102,7 @@ class WalkCase:
     pushes: Sequence[Push] = ()
     seed: int = 0
     physics: float = 1e-3
+    embedded: float = 0.0
     log_period: float = 1e-3
 
 
@@ -208,7 +210,7 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
         theta_dot=v[-robot.n :],
         duration=round((case.steps + 0.5) * case.gait.step_time, 3),
         network=_network(system.delays, case.delay_scale),
-        clock=Clock(physics=case.physics, central=1e-3),
+        clock=Clock(physics=case.physics, embedded=case.embedded, central=1e-3),
         scene=_scene(case),
         seed=case.seed,
         log_period=case.log_period,
