@@ -8,7 +8,9 @@ import pytest
 
 import sealag
 from sealag.errors import CertificateError
+from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.passivity import read_certificate, verify, write_certificate
+from sealag.robot import Motion
 
 SEED = 20261124
 
@@ -25,6 +27,39 @@ def made(tmp_path_factory):
 @pytest.fixture(scope="module")
 def data(made):
     return read_certificate(made)
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    """A certificate over half a step of the planned walk, with shared multipliers."""
+    system = sealag.load("bundled:hume")
+    whole = walk_motion(system.robot, plan_walk(paper_terrain(), steps=2), rate=100.0)
+    part = slice(0, 40)
+    motion = Motion(
+        time=whole.time[part],
+        q=whole.q[part],
+        v=whole.v[part],
+        contact_sets=whole.contact_sets,
+        contact_index=whole.contact_index[part],
+    )
+    certificate = sealag.certify(system, motion, time_varying=True)
+    path = tmp_path_factory.mktemp("moving") / "hume.json"
+    write_certificate(certificate, path)
+    return read_certificate(path)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize("key", ["common_multiplier", "time_varying"])
+def test_shared_multipliers_hold_and_longer_delays_do_not(moving, key, exact):
+    """Both are below the pointwise bound, and hold at every instant with a proof."""
+    assert verify(moving, exact=exact).valid
+    delay = f"{key}_delay_s"
+    assert 0.9 * moving["max_delay_s"] < moving[delay] <= moving["max_delay_s"] * (1.0 + 1e-9)
+    broken = copy.deepcopy(moving)
+    broken[delay] = 1.2 * moving["max_delay_s"]
+    failed = [check.name for check in verify(broken, exact=exact).checks if not check.ok]
+    assert failed
+    assert all("multiplier" in name for name in failed)
 
 
 @pytest.mark.parametrize("exact", [False, True])

@@ -56,13 +56,26 @@ def certify(
         Path | None,
         typer.Option("--out", help="Certificate file; PROJECT.certificate.json if not given."),
     ] = None,
+    time_varying: Annotated[
+        bool,
+        typer.Option(
+            "--time-varying", help="Also for matrices that move inside polytopes (1 s more)."
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Bound the delay at every instant of a motion; exit status 1 if it is not certified."""
     from sealag.cli._commands import certify_project
 
     raise typer.Exit(
-        certify_project(project, motion, criterion=criterion, out=out, as_json=as_json)
+        certify_project(
+            project,
+            motion,
+            criterion=criterion,
+            time_varying=time_varying,
+            out=out,
+            as_json=as_json,
+        )
     )
 
 

@@ -37,13 +37,21 @@ def _motion(system: System, path: Path | None) -> Motion | None:
 
 
 def certify_project(
-    project: str, motion: Path | None, *, criterion: str | None, out: Path | None, as_json: bool
+    project: str,
+    motion: Path | None,
+    *,
+    criterion: str | None,
+    time_varying: bool,
+    out: Path | None,
+    as_json: bool,
 ) -> int:
     """Certify, write the certificate and show the answer; 1 if it is not certified."""
     if criterion is not None and criterion not in set(Criterion):
         raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
     system = load(project)
-    certificate = certify(system, _motion(system, motion), criterion=criterion)
+    certificate = certify(
+        system, _motion(system, motion), criterion=criterion, time_varying=time_varying
+    )
     path = out or Path(f"{resolve_project(project).stem}.certificate.json")
     write_certificate(certificate, path)
     if as_json:
@@ -82,6 +90,10 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         ("published criterion says", _ms(certificate.published_max_delay_s)),
         ("certificate", str(path)),
     ]
+    if certificate.common_multiplier_delay_s is not None:
+        rows.insert(2, ("with one multiplier", _ms(certificate.common_multiplier_delay_s)))
+    if certificate.time_varying_delay_s is not None:
+        rows.insert(3, ("with matrices that move", _ms(certificate.time_varying_delay_s)))
     for name, value in rows:
         print(f"{name:26} {value}")
     for reason in certificate.reasons:

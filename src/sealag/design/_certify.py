@@ -22,6 +22,7 @@ from sealag.passivity import (
     max_delay_common_from_stiffness,
     max_delay_from_stiffness,
     max_delay_multitask,
+    max_delay_polytope_from_stiffness,
 )
 from sealag.robot import Motion
 from sealag.typing import Array
@@ -39,6 +40,7 @@ ASYMMETRY_TOLERANCE = 1e-7
 central differences behind the gradient of gravity compensation."""
 
 PROOF_SHARE = 1.0 - 1e-7
+POLYTOPE_WINDOW = 20
 """Delays are certified this far below their supremum, where a multiplier has room for rounding."""
 
 PROOF_COUNT = 12
@@ -64,7 +66,11 @@ class Bounds:
 
 
 def certify(
-    system: System, motion: Motion | None = None, *, criterion: Criterion | str | None = None
+    system: System,
+    motion: Motion | None = None,
+    *,
+    criterion: Criterion | str | None = None,
+    time_varying: bool = False,
 ) -> Certificate:
     """Certify how much delay a design tolerates at every instant of a motion.
 
@@ -73,6 +79,8 @@ def certify(
         motion: the motion; the system's posture if None.
         criterion: certified (THEORY section 6) or published ((29), (31) as printed); the
             system's own if None.
+        time_varying: also bound the delay for matrices that move inside polytopes around the
+            motion (about a second more); criterion certified only.
 
     Returns:
         The certificate; not certified is a result, not an error.
@@ -105,6 +113,11 @@ def certify(
             f"the design's delay of {delay_s * 1e3:.3f} ms exceeds the bound of "
             f"{max_delay_s * 1e3:.3f} ms"
         )
+    shared = kind is Criterion.CERTIFIED and len(motion) > 1 and not bounds.reasons
+    common_s, common = _common(system, bounds) if shared else (None, None)
+    varying_s, varying = (
+        _time_varying(system, motion, bounds) if shared and time_varying else (None, None)
+    )
     finite = margin is not None and 0.0 < margin.delay < np.inf and max_delay_s > 0.0
     return Certificate(
         status=Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
@@ -129,7 +142,10 @@ def certify(
         first_crossing_s=float(margin.first_crossing) if margin else None,
         unstable_modes=margin.unstable_roots if margin else 0,
         conservatism=margin.delay / max_delay_s if margin and finite else None,
-        common_multiplier_delay_s=_common(system, bounds, kind=kind),
+        common_multiplier_delay_s=common_s,
+        common_multiplier=common,
+        time_varying_delay_s=varying_s,
+        time_varying_multiplier=varying,
         published_max_delay_s=float(published.delay.min()),
         reasons=tuple(reasons),
         assumptions=_assumptions(system, kind, motion),
@@ -241,12 +257,23 @@ def published_bounds(stack: WholeBodyStack, system: System) -> Bounds:
     return Bounds(delay=PROOF_SHARE * delay, upper=many.upper, F=F, angle=whole.angle, reasons=())
 
 
-def _common(system: System, bounds: Bounds, *, kind: Criterion) -> float | None:
-    """Bound with one multiplier for the whole motion; None for one instant or a refused design."""
-    if kind is Criterion.PUBLISHED or len(bounds.delay) == 1 or bounds.reasons:
-        return None
+def _common(system: System, bounds: Bounds) -> tuple[float, list[list[float]] | None]:
+    """Bound with one multiplier for the whole motion, and the multiplier."""
     found = max_delay_common_from_stiffness(bounds.F, system.actuators.motor_damping)
-    return float(found.delay)
+    return PROOF_SHARE * found.delay, None if found.W is None else found.W.tolist()
+
+
+def _time_varying(
+    system: System, motion: Motion, bounds: Bounds
+) -> tuple[float, list[list[float]] | None]:
+    """Bound for stiffnesses that vary inside polytopes around the motion, and its multiplier."""
+    found = max_delay_polytope_from_stiffness(
+        bounds.F,
+        system.actuators.motor_damping,
+        window=POLYTOPE_WINDOW,
+        breaks=(np.flatnonzero(np.diff(motion.contact_index)) + 1).tolist(),
+    )
+    return PROOF_SHARE * found.delay, None if found.W is None else found.W.tolist()
 
 
 def _local(

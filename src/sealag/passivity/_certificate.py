@@ -97,8 +97,12 @@ class Certificate:
         first_crossing_s: delay at which one more pair of roots crosses there; None if none does.
         unstable_modes: roots with positive real part without delay, there.
         conservatism: local margin over max_delay_s; None where either is 0 or infinite.
-        common_multiplier_delay_s: bound with one multiplier for the whole motion; None if it was
-            not computed.
+        common_multiplier_delay_s: bound with one multiplier for the whole motion, which V_4 needs;
+            None if it was not computed.
+        common_multiplier: (n, n) that multiplier Y.
+        time_varying_delay_s: bound for matrices that vary as they like inside polytopes around
+            the motion, window by window, s; None if it was not asked for.
+        time_varying_multiplier: (n, n) its multiplier Y.
         published_max_delay_s: what (29) or (31) as printed gives for the same design, s.
         reasons: why it is not certified.
         assumptions: what is taken for granted.
@@ -132,6 +136,9 @@ class Certificate:
     unstable_modes: int
     conservatism: float | None
     common_multiplier_delay_s: float | None
+    common_multiplier: list[list[float]] | None
+    time_varying_delay_s: float | None
+    time_varying_multiplier: list[list[float]] | None
     published_max_delay_s: float
     reasons: tuple[str, ...]
     assumptions: tuple[str, ...]
@@ -154,7 +161,7 @@ class Certificate:
 
         Numbers that are not finite become null: a delay-independent bound has no number.
         """
-        long = {"time_s", "bounds_s", "proofs"}
+        long = {"time_s", "bounds_s", "proofs", "common_multiplier", "time_varying_multiplier"}
         return _strict({k: v for k, v in asdict(self).items() if k not in long})
 
     def to_json_dict(self) -> dict[str, Any]:

@@ -70,6 +70,7 @@ def verify(certificate: Path | str | dict[str, Any], *, exact: bool = False) -> 
     back, and [[2D − Y, dF], [dFᵀ, Y]] is positive definite (criterion `certified`; for
     `published` only the last and that F follows). Then the claims: smallest bound, worst instant,
     verdict. Bounds of instants without a proof are the maker's word; the smallest one has one.
+    Multipliers shared by the whole motion are checked at the instants with a proof.
 
     Args:
         certificate: a file, or what `read_certificate` returns.
@@ -192,16 +193,29 @@ def _proofs(data: dict[str, Any], number: Callable[[Any], Array]) -> Iterator[Ch
             raise ValueError(f"{name} has matrices of another size than its {n} joints")
         yield from _stiffness(name, data, J=J, S=S, G=G, F=F, K=K)
         d = number([proof["delay_s"]])[0]
-        block = np.block([[np.diag(2 * D) - Y, d * F], [(d * F).T, Y]])
-        symmetric = bool((Y == Y.T).all())
-        slack, ok = positive_definite(_scaled(block, D))
-        yield Check(
-            name=f"{name}: matrix inequality",
-            ok=ok and symmetric,
-            detail=f"[[2D - Y, dF], [dF', Y]] is positive definite ({slack})"
-            if ok and symmetric
-            else f"[[2D - Y, dF], [dF', Y]] is not positive definite ({slack})",
-        )
+        yield _inequality(f"{name}: matrix inequality", D=D, F=F, Y=Y, d=d)
+        for words, longest, Y in _shared(data):
+            d = number([longest])[0]
+            yield _inequality(f"{name}: {words} multiplier", D=D, F=F, Y=number(Y), d=d)
+
+
+def _shared(data: dict[str, Any]) -> Iterator[tuple[str, float, Any]]:
+    """Multipliers that hold for the whole motion: name, delay, Y."""
+    for words, key in (("common", "common_multiplier"), ("time-varying", "time_varying")):
+        longest, Y = data[f"{key}_delay_s"], data[f"{key.removesuffix('_multiplier')}_multiplier"]
+        if Y is not None and longest is not None:
+            yield words, longest, Y
+
+
+def _inequality(name: str, *, D: Array, F: Array, Y: Array, d: Any) -> Check:
+    """Whether [[2D − Y, dF], [dFᵀ, Y]] ≻ 0."""
+    block = np.block([[np.diag(2 * D) - Y, d * F], [(d * F).T, Y]])
+    slack, ok = positive_definite(_scaled(block, D))
+    holds = ok and bool((Y == Y.T).all())
+    words = "is" if holds else "is not"
+    return Check(
+        name=name, ok=holds, detail=f"[[2D - Y, dF], [dF', Y]] {words} positive definite ({slack})"
+    )
 
 
 def _scaled(block: Array, D: Array) -> Array:
