@@ -50,7 +50,7 @@ def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
     ablations = walk_success(ablation_cases(), rough_terrains(4), jobs=2)
     gains = walk_success(gain_cases(), rough_terrains(4), jobs=2)
     simulated = figure_4(system.robot, simulated_motion(walk.run), system=system)
-    traces = figure_5(system)
+    traces = figure_5(jobs=2)
     claims = (*figure_4_claims(figure), *figure_5_claims(traces))
     progress("[7/7] writing the page")
     extra = [

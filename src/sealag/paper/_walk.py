@@ -29,7 +29,9 @@ from sealag.simulation import (
     closed_loop,
 )
 from sealag.typing import Array
+from sealag.whole_body import Measurement, TickController
 
+TICK = 1e-3  # s, period of the central controller
 FEET = ("left_foot", "right_foot")
 SPEED_TOLERANCE = 0.20
 WIDTH_TOLERANCE = 0.25
@@ -121,6 +123,8 @@ class Walk:
         apex_step: (A,) which foothold was stood on.
         step_width: (S,) distance of successive footholds across, positive when not crossed, m.
         com: (N, 3) CoM at the logged instants, m.
+        task: (T, n) torque that the tasks asked for at each tick of the controller, before
+            feedforward of motors and springs, Nm.
     """
 
     case: WalkCase
@@ -133,6 +137,7 @@ class Walk:
     apex_step: Array
     step_width: Array
     com: Array
+    task: Array
 
     @property
     def steps(self) -> int:
@@ -200,22 +205,40 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
     seen = controller
     if case.noise is not None:
         seen = NoisySensors(controller, robot, noise=case.noise, seed=case.seed)
+    asked: list[Array] = []
     run = closed_loop(
         plant,
         springs,
-        seen,
+        _Witness(seen, controller, asked),
         q=q,
         v=v,
         theta=theta,
         theta_dot=v[-robot.n :],
         duration=round((case.steps + 0.5) * case.gait.step_time, 3),
         network=_network(system.delays, case.delay_scale),
-        clock=Clock(physics=case.physics, embedded=case.embedded, central=1e-3),
+        clock=Clock(physics=case.physics, embedded=case.embedded, central=TICK),
         scene=_scene(case),
         seed=case.seed,
         log_period=case.log_period,
     )
-    return measure_walk(plant, run, case)
+    return measure_walk(plant, run, case, task=np.array(asked).reshape(-1, robot.n))
+
+
+class _Witness:
+    """Keeps the task torque of every tick."""
+
+    def __init__(
+        self, seen: TickController, controller: WalkingController, asked: list[Array]
+    ) -> None:
+        self._seen, self._controller, self._asked = seen, controller, asked
+
+    def reset(self, t: float, measurement: Measurement) -> None:
+        self._asked.clear()
+        self._seen.reset(t, measurement)
+
+    def tick(self, t: float, measurement: Measurement, out: Array) -> None:
+        self._seen.tick(t, measurement, out)
+        self._asked.append(self._controller.tau_task.copy())
 
 
 def _network(delays: Delays, factor: float) -> Network:
@@ -240,7 +263,7 @@ def _scene(case: WalkCase) -> Scene:
     return Scene(feet=feet, ground=case.terrain, pushes=case.pushes)
 
 
-def measure_walk(robot: Robot, run: Run, case: WalkCase) -> Walk:
+def measure_walk(robot: Robot, run: Run, case: WalkCase, *, task: Array) -> Walk:
     """Find footholds, apexes and step widths in a run.
 
     A foothold is where the foot that was in the air touches down; the apex is where the CoM
@@ -250,6 +273,7 @@ def measure_walk(robot: Robot, run: Run, case: WalkCase) -> Walk:
         robot: The robot that walked.
         run: The simulation.
         case: What was asked for.
+        task: Task torque of every tick (T, n), Nm.
     """
     at = robot.workspace()
     count = len(run.time)
@@ -285,4 +309,5 @@ def measure_walk(robot: Robot, run: Run, case: WalkCase) -> Walk:
         apex_step=stood[apex],
         step_width=side * np.diff(place[:, 1]),
         com=com,
+        task=task,
     )

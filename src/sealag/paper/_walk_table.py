@@ -117,7 +117,7 @@ def _summary(walk: Walk) -> Walk:
             "tau_osc", "measurement_age", "command_age", "contact_mode", "contact_force",
         )
     }  # fmt: skip
-    return replace(walk, run=replace(walk.run, **short, events=()), com=empty)
+    return replace(walk, run=replace(walk.run, **short, events=()), com=empty, task=empty)
 
 
 def rough_terrains(count: int = 20, *, amplitude: float = 0.05) -> tuple[Terrain, ...]:

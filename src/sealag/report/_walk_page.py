@@ -151,43 +151,46 @@ def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Se
         traces: walks with several β.
         joints: names.
     """
-    shown = [t for t in traces if t.damping_scale == 1.0]
+    shown = [t for t in traces if t.damping_scale == 1.0 and t.stiffness == traces[0].stiffness]
     knee = next(k for k, name in enumerate(joints) if "knee" in name)
     rows = [
         [
-            Cell(text=f"{t.beta:g}", css="number"),
+            Cell(text=f"{t.stiffness:g}", css="number"),
             Cell(text=f"{t.damping_scale:g}", css="number"),
-            t.walk.cause,
+            Cell(text=f"{t.beta:g}", css="number"),
             *(_if_walked(t, f"{value:.1f}") for value in t.deviation[:3]),
             _if_walked(t, f"{t.raw_deviation.mean():.0f}"),
             _if_walked(t, f"{t.lag * 1e3:.1f}"),
+            t.walk.cause,
         ]
         for t in traces
     ]
+    channel = traces[0].channel
     return Section(
         anchor="figure5",
         title="Fig. 5: command and spring torque",
         blocks=[
             Text(
                 text=(
-                    "At α = 1 most of the command is D_θθ̇_d, which the embedded damping takes off "
-                    "again. The effect of β shows in the command after that damping, τ_osc − D_θθ̇, "
-                    "whose difference to Γ_sea is B_sθ̈."
+                    "Γ_osc is the torque that the tasks ask for, as late as its command acts at "
+                    "the motors; Γ_sea is the spring torque. The command τ_osc itself is at α = 1 "
+                    "mostly D_θθ̇_d, which the embedded damping takes off again and which hides β."
                 )
             ),
             Figure(
                 svg=plot_torques(shown, knee),
-                caption=f"{joints[knee]}: command after damping (thin) and spring torque (thick), "
-                "Nm, for the smallest and largest β.",
+                caption=f"{joints[knee]}, K = {shown[0].stiffness:g} Nm/rad, α = 1: Γ_osc (thin) "
+                "and Γ_sea (thick), Nm, for the smallest and largest β.",
             ),
             Table(
                 columns=[
-                    "β", "α", "walk", *(f"{name} (Nm)" for name in joints[:3]),
-                    "τ_osc − Γ_sea (Nm)", "lag (ms)",
+                    "K (Nm/rad)", "α", "β", *(f"{name} (Nm)" for name in joints[:3]),
+                    "τ_osc − Γ_sea (Nm)", "lag (ms)", "walk",
                 ],
                 rows=rows,
-                caption="RMS of τ_osc − D_θθ̇ − Γ_sea for one leg's joints, mean RMS with the "
-                "damping left in, and the measured lag of the acting command.",
+                caption="RMS of Γ_osc − Γ_sea for one leg's joints; mean RMS over all joints with "
+                "the feedforward left in; measured lag of the acting command behind the sent one, "
+                f"beside a mean (T_H + T_L)/2 of {channel * 1e3:.1f} ms.",
             ),
         ],
     )  # fmt: skip

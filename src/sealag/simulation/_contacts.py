@@ -101,9 +101,17 @@ class Contacts:
         return z - float(self._radius[point]) - self.ground.height(x, y)
 
     def lower_floors(self, at: Instant, before: IntArray) -> None:
-        """Let points of a sole that were closed before and are open now hang a little lower."""
-        for point in np.flatnonzero((before > self.closed) & (self.ridge == _SOLE)).tolist():
-            self._floor[point] = min(self.height(at, point), 0.0) - 0.5 * _RISEN
+        """Let points that were closed before and are open now leave from where they are.
+
+        Stabilisation and slopes leave them some µm below the ground; those of a sole may also sink
+        a little, see above.
+        """
+        for point in np.flatnonzero(before > self.closed).tolist():
+            height = min(self.height(at, point), 0.0)
+            if self.ridge[point] == _SOLE:
+                self._floor[point] = height - 0.5 * _RISEN
+            elif height < -_NEAR:
+                self._floor[point] = height
 
     def measure_gaps(self, at: Instant) -> None:
         """Measure the gaps of all open points."""
