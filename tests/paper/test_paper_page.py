@@ -43,7 +43,7 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
     rows = walk_success({"default": WalkCase(steps=1)}, [paper_terrain()])
     page = write_paper_page(
         tmp_path, figure, figure_4_claims(figure), unsafe=unsafe_examples(draws=10),
-        table=random_plant_table(30), extra=[walk_section(system.robot, walk, rows, rows)],
+        table=random_plant_table(30), extra=[walk_section(system.robot, walk, rows, rows, rows)],
         version="test",
     )  # fmt: skip
     text = page.read_text()

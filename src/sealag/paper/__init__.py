@@ -1,5 +1,6 @@
 """The paper's figures and statements, computed here and checked one by one."""
 
+from sealag.paper._beyond import HELD_OUT, DelayMap, beyond_cases, delay_map, walk_beyond
 from sealag.paper._claims import Claim, Verdict
 from sealag.paper._figure4 import (
     CertifiedVariant,
@@ -23,8 +24,10 @@ from sealag.paper._walk_table import (
 )
 
 __all__ = [
+    "HELD_OUT",
     "CertifiedVariant",
     "Claim",
+    "DelayMap",
     "Figure4",
     "RandomPlantTable",
     "SensorNoise",
@@ -35,6 +38,8 @@ __all__ = [
     "WalkCase",
     "WalkRow",
     "ablation_cases",
+    "beyond_cases",
+    "delay_map",
     "figure_4",
     "figure_4_claims",
     "figure_5",
@@ -49,5 +54,6 @@ __all__ = [
     "simulate_walk",
     "simulated_motion",
     "unsafe_examples",
+    "walk_beyond",
     "walk_success",
 ]

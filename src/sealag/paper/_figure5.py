@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,7 @@ def figure_5(
     from joblib import Parallel, delayed
 
     cases = [(K, scale, beta) for K in STIFFNESSES for scale in DAMPING_SCALES for beta in betas]
-    traces = Parallel(n_jobs=jobs)(delayed(_trace)(project, *case) for case in cases)
+    traces: Any = Parallel(n_jobs=jobs)(delayed(_trace)(project, *case) for case in cases)
     return tuple(traces)
 
 

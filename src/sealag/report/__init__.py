@@ -3,9 +3,17 @@
 from sealag.report._mcap import McapRecorder, RecordingFile, Signal, read_recording
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page
 from sealag.report._paper_page import write_paper_page
-from sealag.report._plots import plot_figure_4, plot_gait, plot_torques, plot_walk_bounds
+from sealag.report._plots import (
+    plot_delay_map,
+    plot_figure_4,
+    plot_gait,
+    plot_torques,
+    plot_walk_bounds,
+)
 from sealag.report._recording import write_run
 from sealag.report._walk_page import (
+    beyond_section,
+    energy_section,
     figure_5_section,
     limits_section,
     playback,
@@ -23,9 +31,12 @@ __all__ = [
     "Signal",
     "Table",
     "Text",
+    "beyond_section",
+    "energy_section",
     "figure_5_section",
     "limits_section",
     "playback",
+    "plot_delay_map",
     "plot_figure_4",
     "plot_gait",
     "plot_torques",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sealag.paper import Figure4, TorqueTrace, Walk
+from sealag.paper import DelayMap, Figure4, TorqueTrace, Walk
 from sealag.whole_body import Feedback, StiffnessForm
 
 COLOURS = ("#0b6e99", "#c0561f", "#5b7f2b")
@@ -157,4 +157,42 @@ def plot_torques(traces: Sequence[TorqueTrace], joint: int) -> str:
         axes.set_ylim(-limit, limit)
         axes.grid(alpha=0.25)
         axes.legend(frameon=False, fontsize=10)
+        return _svg(drawing)
+
+
+def plot_delay_map(delays: DelayMap) -> str:
+    """Draw what was walked over spring stiffness and delay, with the bounds as lines.
+
+    Args:
+        delays: the map.
+
+    Returns:
+        SVG markup.
+    """
+    with _drawing(7.2, 4.4) as (drawing, axes):
+        K, d = (grid.T for grid in np.meshgrid(delays.stiffness, delays.d_1 * 1e3))
+        gait = delays.gaits == delays.terrains
+        walked = (delays.walked == delays.terrains) & ~gait
+        fell = ~gait & ~walked
+        for mark, face, chosen, label in (
+            ("o", COLOURS[2], gait, "walked, a gait"),
+            ("o", "none", walked, "walked"),
+            ("x", "#a33", fell, "fell"),
+        ):
+            colour = "#a33" if mark == "x" else COLOURS[2]
+            style = {"edgecolors": colour, "facecolors": face} if mark == "o" else {"color": colour}
+            axes.scatter(K[chosen], d[chosen], s=46, marker=mark, label=label, **style)
+        for values, style, colour, label in (
+            (delays.certified_motor, "-", COLOURS[0], "certified, motor angles"),
+            (delays.certified_static, "--", COLOURS[0], "certified, q̄(θ)"),
+            (delays.first_crossing, ":", "#444", "next roots cross (exact)"),
+        ):
+            axes.plot(delays.stiffness, values * 1e3, style, color=colour, label=label)
+        axes.set_xscale("log")
+        axes.set_xticks(delays.stiffness, [f"{value:g}" for value in delays.stiffness])
+        axes.minorticks_off()
+        axes.set_xlabel("spring stiffness K (Nm/rad)")
+        axes.set_ylabel("largest delay d_1 (ms)")
+        axes.set_ylim(0.0, 1.05e3 * float(delays.d_1[-1]))
+        axes.legend(frameon=False, fontsize=9, ncols=2, loc="lower right")
         return _svg(drawing)
