@@ -5,18 +5,28 @@ from html.parser import HTMLParser
 
 import numpy as np
 
-from sealag.design import load
+from sealag.design import certify, load
 from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.paper import (
+    DelayMap,
     WalkCase,
+    delay_map,
     figure_4,
     figure_4_claims,
+    figure_5,
     random_plant_table,
     simulate_walk,
     unsafe_examples,
     walk_success,
 )
-from sealag.report import walk_section, write_paper_page
+from sealag.report import (
+    beyond_section,
+    energy_section,
+    figure_5_section,
+    limits_section,
+    walk_section,
+    write_paper_page,
+)
 
 
 class Links(HTMLParser):
@@ -41,22 +51,49 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
     figure = figure_4(system.robot, motion, system=system)
     walk = simulate_walk(system, WalkCase(steps=2))
     rows = walk_success({"default": WalkCase(steps=1)}, [paper_terrain()])
+    delays = delay_map(motion, stiffnesses=[350.0], scales=[1.0, 6.0], terrains=1)
+    certificate = certify(system, motion, time_varying=True)
+    traces = figure_5(betas=[0.5], jobs=2)
+    extra = [
+        walk_section(system.robot, walk, rows, rows, rows),
+        energy_section(walk, certificate),
+        limits_section(figure, figure, rows, delays),
+        figure_5_section(traces, system.robot.joints),
+        beyond_section(rows, certificate),
+    ]
     page = write_paper_page(
         tmp_path, figure, figure_4_claims(figure), unsafe=unsafe_examples(draws=10),
-        table=random_plant_table(30), extra=[walk_section(system.robot, walk, rows, rows, rows)],
-        version="test",
+        table=random_plant_table(30), extra=extra, version="test",
     )  # fmt: skip
     text = page.read_text()
     links = Links()
     links.feed(text)
     assert links.outside == []
-    assert set(links.anchors) >= {"claims", "figure4", "certified", "unsafe", "walk"}
+    assert set(links.anchors) >= {
+        "claims", "figure4", "certified", "unsafe", "walk", "energy", "limits", "figure5", "beyond",
+    }  # fmt: skip
     assert set(links.anchors) - {a for a in links.anchors if a.startswith(("m", "p"))} <= links.ids
     assert 'name="viewport"' in text
     assert not re.search(r"https?://(?!www\.w3\.org|purl\.org|creativecommons|matplotlib)", text)
     assert text.count("<svg") >= 3
     assert "<canvas" in text
+    assert f"{delays.first_crossing[0] * 1e3:.1f}" in text
+    assert f"{certificate.time_varying_delay_s * 1e3:.2f} ms" in text
+    assert f"{walk.run.audit.closure:.1e}" in text
+    assert delays.walked.tolist() == [[1, 0]]  # the paper's delays, and six times as long ones
     assert f"{figure.delay_s[1][3] * 1e3:.1f}" in text
     csv = np.genfromtxt(tmp_path / "figure4.csv", delimiter=",", names=True)
     np.testing.assert_allclose(csv["one_leg_delay_s_D10"], figure.delay_s[1], rtol=1e-8)
     assert len((tmp_path / "figure4_instants.csv").read_text().splitlines()) == len(motion) + 1
+
+
+def test_the_longest_delay_ends_at_the_first_fall():
+    """Walking again beyond a fall does not count."""
+    two = np.array([0.1, 0.2, 0.3, 0.4])
+    delays = DelayMap(
+        stiffness=np.array([1.0, 2.0]), scale=two, d_1=two, terrains=2,
+        walked=np.array([[2, 2, 1, 2], [2, 2, 2, 2]]), gaits=np.array([[0, 2, 2, 2], [2, 2, 0, 0]]),
+        certified_motor=two[:2], certified_static=two[:2], first_crossing=two[:2],
+    )  # fmt: skip
+    assert delays.longest_walked.tolist() == [0.2, 0.4]
+    assert delays.longest_gait.tolist() == [0.0, 0.2]

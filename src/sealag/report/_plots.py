@@ -14,7 +14,7 @@ COLOURS = ("#0b6e99", "#c0561f", "#5b7f2b")
 
 
 @contextmanager
-def _drawing(width: float, height: float) -> Iterator[tuple[Any, Any]]:
+def _drawing(width: float, height: float, *, rows: int = 1) -> Iterator[tuple[Any, Any]]:
     """A figure and its axes that leave nothing behind; text stays text."""
     import matplotlib
     from matplotlib.figure import Figure
@@ -24,7 +24,7 @@ def _drawing(width: float, height: float) -> Iterator[tuple[Any, Any]]:
          "axes.spines.right": False, "font.family": "sans-serif"}
     ):  # fmt: skip
         figure = Figure(figsize=(width, height), layout="constrained")
-        yield figure, figure.subplots()
+        yield figure, figure.subplots(rows, sharex=True)
 
 
 def _svg(figure: Any) -> str:
@@ -132,31 +132,33 @@ def plot_gait(walk: Walk) -> str:
         return _svg(drawing)
 
 
-def plot_torques(traces: Sequence[TorqueTrace], joint: int) -> str:
-    """Draw command and spring torque of one joint for the smallest and largest β.
+def plot_torques(traces: Sequence[TorqueTrace], joints: Sequence[int]) -> str:
+    """Draw command and spring torque of some joints for the smallest and largest β.
 
     Args:
         traces: walks with several β.
-        joint: its place.
+        joints: their places, one panel each.
 
     Returns:
         SVG markup.
     """
-    with _drawing(7.2, 4.0) as (drawing, axes):
-        for colour, trace in zip(COLOURS, (traces[0], traces[-1]), strict=False):
-            time = trace.walk.run.time
-            pick = slice(0, None, max(1, len(time) // 900))
-            axes.plot(time[pick], trace.command[pick, joint], color=colour, lw=0.7)
-            axes.plot(
-                time[pick], trace.achieved[pick, joint], color=colour, lw=2.0,
-                label=f"β = {trace.beta:g}",
-            )  # fmt: skip
+    with _drawing(7.2, 2.4 * len(joints), rows=len(joints)) as (drawing, panels):
+        names = traces[0].walk.run.joints
+        for axes, joint in zip(np.atleast_1d(panels), joints, strict=True):
+            for colour, trace in zip(COLOURS, (traces[0], traces[-1]), strict=False):
+                time = trace.walk.run.time
+                pick = slice(0, None, max(1, len(time) // 900))
+                axes.plot(time[pick], trace.command[pick, joint], color=colour, lw=0.7)
+                axes.plot(
+                    time[pick], trace.achieved[pick, joint], color=colour, lw=2.0, alpha=0.6,
+                    label=f"β = {trace.beta:g}",
+                )  # fmt: skip
+            axes.set_ylabel(f"{names[joint]} (Nm)")
+            limit = 1.4 * max(float(np.abs(t.achieved[:, joint]).max()) for t in traces)
+            axes.set_ylim(-limit, limit)
+            axes.grid(alpha=0.25)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel("torque (Nm)")
-        limit = 1.6 * max(float(np.abs(t.achieved[:, joint]).max()) for t in traces)
-        axes.set_ylim(-limit, limit)
-        axes.grid(alpha=0.25)
-        axes.legend(frameon=False, fontsize=10)
+        np.atleast_1d(panels)[0].legend(frameon=False, fontsize=10, ncols=2)
         return _svg(drawing)
 
 
@@ -194,5 +196,5 @@ def plot_delay_map(delays: DelayMap) -> str:
         axes.set_xlabel("spring stiffness K (Nm/rad)")
         axes.set_ylabel("largest delay d_1 (ms)")
         axes.set_ylim(0.0, 1.05e3 * float(delays.d_1[-1]))
-        axes.legend(frameon=False, fontsize=9, ncols=2, loc="lower right")
+        drawing.legend(frameon=False, fontsize=9, ncols=3, loc="outside upper center")
         return _svg(drawing)

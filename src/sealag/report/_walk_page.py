@@ -308,7 +308,6 @@ def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Se
         joints: names.
     """
     shown = [t for t in traces if t.damping_scale == 1.0 and t.stiffness == traces[0].stiffness]
-    knee = next(k for k, name in enumerate(joints) if "knee" in name)
     rows = [
         [
             Cell(text=f"{t.stiffness:g}", css="number"),
@@ -334,9 +333,9 @@ def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Se
                 )
             ),
             Figure(
-                svg=plot_torques(shown, knee),
-                caption=f"{joints[knee]}, K = {shown[0].stiffness:g} Nm/rad, α = 1: Γ_osc (thin) "
-                "and Γ_sea (thick), Nm, for the smallest and largest β.",
+                svg=plot_torques(shown, range(3)),
+                caption=f"One leg's joints at K = {shown[0].stiffness:g} Nm/rad, α = 1: Γ_osc "
+                "(thin) and Γ_sea (thick) for the smallest and largest β.",
             ),
             Table(
                 columns=[
