@@ -71,10 +71,13 @@ def _loop(robot, springs, F, q):
     return A_0, A_1
 
 
-def _growth(robot, springs, F, q, delay, periods):
+def _growth(robot, springs, F, q, delay, periods, *, up=0.0):
     """Ratio of the late to the early swing after a small displacement, with constant delay."""
-    tick = delay / 40
-    late = Link(delay=Constant(value=delay - tick / 2))  # the hold adds half a period
+    count = max(40, int(np.ceil(100.0 * delay)))
+    tick = delay / count
+    whole = delay - tick / 2  # the hold adds half a period
+    first = round(up * count) * tick
+    measured, late = Link(delay=Constant(value=first)), Link(delay=Constant(value=whole - first))
     none = Link(delay=Constant(value=0.0))
     away = 1e-4 * np.random.default_rng(0).normal(size=robot.n)
     run = closed_loop(
@@ -85,7 +88,7 @@ def _growth(robot, springs, F, q, delay, periods):
         theta=q + away,
         duration=round(periods * delay / tick) * tick,
         clock=Clock(physics=tick, central=tick),
-        network=Network(central_up=none, central_down=late, embedded_down=none),
+        network=Network(central_up=measured, central_down=late, embedded_down=none),
         scene=Scene(),
     )
     assert run.outcome is Outcome.COMPLETED
@@ -94,7 +97,7 @@ def _growth(robot, springs, F, q, delay, periods):
     return swing[-third:].max() / swing[third : 2 * third].max()
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(50))
 def test_margin_parts_convergence_from_divergence(tmp_path, seed):
     robot, springs, F, q = _design(tmp_path, seed)
     margin = float(delay_margin(*_loop(robot, springs, F, q)).delay)
@@ -104,7 +107,20 @@ def test_margin_parts_convergence_from_divergence(tmp_path, seed):
     assert _growth(robot, springs, F, q, 1.05 * margin, 60) > 1
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_only_the_sum_of_both_ways_moves_the_roots(tmp_path, seed):
+    """d_1 decides, d_2 does not: the same total gives the same swing however it is split."""
+    robot, springs, F, q = _design(tmp_path, seed)
+    margin = float(delay_margin(*_loop(robot, springs, F, q)).delay)
+    growth = [_growth(robot, springs, F, q, 1.05 * margin, 60, up=up) for up in (0.0, 0.3, 0.9)]
+    np.testing.assert_allclose(growth[1:], growth[0], rtol=1e-6)
+    assert _growth(robot, springs, F, q, 1.15 * margin, 60, up=0.3) > 1.05 * growth[1]
+
+
+PUSHES = 250  # of each of 40 designs: 10,000
+
+
+@pytest.mark.parametrize("seed", range(1, 80, 2))  # two joints each
 def test_certified_design_stays_passive_under_pushes(tmp_path, seed):
     """Time-varying delay, jitter and losses whose bound is the certified delay; many pushes."""
     robot, springs, F, q = _design(tmp_path, seed)
@@ -117,13 +133,13 @@ def test_certified_design_stays_passive_under_pushes(tmp_path, seed):
     network = Network(
         central_up=link, central_down=link, embedded_down=Link(delay=Constant(value=0.0))
     )
-    clock = Clock(physics=tick / 4, central=tick)
+    clock = Clock(physics=tick / 2, central=tick)
     assert network.delay_bound(clock) < certified
     rng = np.random.default_rng(seed)
     pushes = [
         Push(frame=f"link{robot.n - 1}", force=(*rng.normal(0, 20, 2), 0.0), start=start,
              duration=5 * tick)
-        for start in 20 * tick * np.arange(1, 50)
+        for start in 20 * tick * np.arange(1, PUSHES + 1)
     ]  # fmt: skip
     run = closed_loop(
         robot,
@@ -131,7 +147,7 @@ def test_certified_design_stays_passive_under_pushes(tmp_path, seed):
         MotorStiffness(F, q),
         q=q,
         theta=q,
-        duration=1100 * tick,
+        duration=(20 * PUSHES + 100) * tick,
         clock=clock,
         network=network,
         scene=Scene(pushes=pushes),
@@ -140,6 +156,7 @@ def test_certified_design_stays_passive_under_pushes(tmp_path, seed):
     assert run.outcome is Outcome.COMPLETED
     side = run.audit.controller_side
     assert side is not None
+    assert np.abs(run.v).max() < 1e3
     assert side.passive, (side.first_violation, side.joint, side.slack.min())
     assert run.audit.joint_side.passive
     assert side.tolerance < 1e-2 * run.audit.scalar_flows["disturbance"][-1]
