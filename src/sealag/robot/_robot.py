@@ -36,7 +36,7 @@ class Robot:
         velocity_limit: (n,) rad/s or m/s, inf where there is none.
         effort_limit: (n,) Nm or N, inf where there is none.
         rotor_inertia: (n,) reflected rotor inertia that the URDF states, else 0, kg m².
-        mass: total mass, kg.
+        mass: of everything that moves, kg; what is fixed to the world is not in it.
     """
 
     name: str
@@ -235,7 +235,7 @@ class Robot:
         ).copy()
 
     def center_of_mass(self, q: ArrayLike) -> Array:
-        """Return the centre of mass (3,) in the world, m.
+        """Return the centre of mass (3,) of everything that moves, in the world, m.
 
         Args:
             q: (nq,).
@@ -336,7 +336,7 @@ def load_robot(
     model, digest = read_model(path, floating_base=floating_base)
     model = reduce_model(model, path, actuated=actuated)
     names = tuple(name for name in model.names[1:] if name != "root_joint")
-    mass = float(sum(inertia.mass for inertia in model.inertias))
+    mass = float(sum(inertia.mass for inertia in model.inertias[1:]))
     n = len(names)
     if model.nq != n + (7 if floating_base else 0):
         raise RobotError(f"{path}: a joint's position is not one number; that is not supported.")
