@@ -4,6 +4,9 @@ A message says what was wrong, where (file, key, joint, frame) and what would be
 sentence. "Not certified" is a result and never an exception.
 """
 
+import difflib
+from collections.abc import Iterable, Sequence
+
 
 class SealagError(Exception):
     """Root of every error that sealag raises on purpose; the command line exits with status 2."""
@@ -46,3 +49,28 @@ class SolverError(SealagError, RuntimeError):
 
 class CertificateError(SealagError, ValueError):
     """A certificate file is not readable as a certificate at all."""
+
+
+def near(name: str, known: Iterable[str], *, what: str) -> UnknownNameError:
+    """Make the error for a name that does not exist, with near matches.
+
+    Args:
+        name: what was asked for.
+        known: the names that exist.
+        what: such as "joint" or "frame".
+    """
+    known = list(known)
+    matches = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
+    hint = f"did you mean {either(matches)}?" if matches else f"there is {either(known[:12])}."
+    return UnknownNameError(f"No {what} is called {name!r}; {hint}")
+
+
+def either(names: Sequence[str]) -> str:
+    """Return names as a list in words: a, b or c.
+
+    Args:
+        names: the names.
+    """
+    if not names:
+        return "none"
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"

@@ -52,6 +52,12 @@ CHANGES = {
     "missing section": ("[robot]", "[robott]", ["robot"]),
     "missing URDF": ("bundled:hume.urdf", "nowhere.urdf", ["nowhere.urdf"]),
     "not TOML": ("[robot]", "[robot", ["TOML"]),
+    "unknown gait key": ("apex_speed = 0.5", "apexspeed = 0.5", ["apexspeed", "apex_speed"]),
+    "impossible gait": ("transfer_time = 0.06", "transfer_time = 0.34", ["60 %"]),
+    "unknown means": ('prediction = "model"', 'prediction = "magic"', ["prediction", "magic"]),
+    "text for a means": ("task_damping = 0.5", 'task_damping = "much"', ["task_damping", "much"]),
+    "one foot": ('feet = ["left_foot", "right_foot"]', 'feet = ["left_foot"]', ["feet"]),
+    "unknown terrain": ('kind = "paper"', 'kind = "moon"', ["terrain", "moon"]),
     "text for number": ("rotor_inertia = 0.093", 'rotor_inertia = "heavy"', ["rotor_inertia"]),
 }  # fmt: skip
 

@@ -1,12 +1,16 @@
 """`sealag simulate`: scenarios, recordings, named ends."""
 
 import json
+import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sealag.cli import main
+from sealag.design import load, resolve_project
+from sealag.locomotion import WalkingGait, WalkingOptions
 from sealag.report import read_recording
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -41,6 +45,34 @@ def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, 
     assert "[robot]" in recording.attachments["project.toml"].decode()
     assert recording.metadata["outcome"] == "completed"
     assert {"/tf", "/energy", "/torque/spring", "/delay"} <= set(recording.signals)
+
+
+def test_walk_takes_its_steps(tmp_path, capsys):
+    """`--scenario walk` walks what the project describes, and says how the gait is."""
+    text = (resolve_project("bundled:hume")).read_text()
+    path = tmp_path / "short.toml"
+    path.write_text(text.replace("steps = 7", "steps = 3").replace('"paper" }', '"flat" }', 1))
+    out = tmp_path / "w.mcap"
+    code, text, err = run(capsys, path, "--scenario", "walk", "--out", out, "--json")
+    answer = json.loads(text)
+    assert (code, err, answer["outcome"]) == (0, "", "completed")
+    assert answer["steps"] >= 3
+    assert answer["gait"] is True
+    assert np.abs(np.array(answer["apex_speed_m_s"]) / 0.5 - 1.0).max() < 0.2
+    assert read_recording(out).complete
+    code, _, err = run(capsys, EXAMPLES / "anymal.toml", "--scenario", "walk", "--out", out)
+    assert code == 2
+    assert "[walking]" in err
+
+
+def test_the_bundled_walk_is_the_default_one():
+    """The project file states every number of the gait and the means, and they are the defaults."""
+    walking = load("bundled:hume").walking
+    assert walking.gait == WalkingGait()
+    assert walking.options == WalkingOptions()
+    section = tomllib.loads(resolve_project("bundled:hume").read_text())["walking"]
+    assert set(section["gait"]) == {field.name for field in fields(WalkingGait)}
+    assert set(section["options"]) == {field.name for field in fields(WalkingOptions)}
 
 
 def test_same_seed_same_run(tmp_path, capsys):

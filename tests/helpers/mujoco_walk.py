@@ -13,7 +13,7 @@ import numpy as np
 
 from helpers.mujoco_sea import MujocoRobot
 from sealag.design import System
-from sealag.locomotion import WalkingController, walking_start
+from sealag.locomotion import begin_walk
 from sealag.paper import WalkCase
 from sealag.whole_body import Measurement
 
@@ -222,11 +222,9 @@ class _Feet:
 def mujoco_walk(system: System, case: WalkCase, *, step: float) -> MujocoWalk:
     """Walk a case with MuJoCo as plant, at one of its steps (s)."""
     robot, springs = system.robot, system.actuators
-    controller = WalkingController(
+    controller, q, v, theta = begin_walk(
         robot, springs, case.terrain, feet=FEET, gait=case.gait, options=case.options
     )
-    q, v = walking_start(robot, case.terrain, gait=case.gait, feet=FEET)
-    theta = controller.motor_start(q, v)
     twin = MujocoRobot.build(
         robot, springs, step=step, feet=FEET, delay=LONGEST, friction=0.0,
         radius=RADIUS, soft=4.0 * step,

@@ -103,7 +103,7 @@ def verify(
 def simulate(
     project: Project,
     scenario: Annotated[
-        str | None, typer.Option("--scenario", help="regulate, track, drop or balance.")
+        str | None, typer.Option("--scenario", help="regulate, track, drop, balance or walk.")
     ] = None,
     duration: Annotated[float | None, typer.Option("--duration", help="Seconds.")] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Of jitter and losses.")] = None,

@@ -8,8 +8,9 @@ import numpy as np
 
 import sealag
 from sealag.cli._app import show_json
-from sealag.design import load, resolve_project, simulate
+from sealag.design import System, load, resolve_project, scenario_duration, simulate
 from sealag.errors import InputError
+from sealag.paper import WalkCase, measure_walk
 from sealag.report import write_run
 from sealag.simulation import Run
 
@@ -26,7 +27,7 @@ def simulate_project(
 ) -> None:
     """Run a scenario with a progress bar, write the recording and show the audit."""
     system = load(project)
-    length = system.simulation.duration_s if duration is None else duration
+    length = scenario_duration(system, scenario) if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"--duration is {length}; a positive time in s is needed.")
     run = _with_progress(
@@ -43,6 +44,8 @@ def simulate_project(
     path = out or Path(f"{resolve_project(project).stem}.mcap")
     write_run(run, system.robot, path, project=system.text, version=sealag.__version__)
     answer = summary(run, path)
+    if (scenario or system.simulation.scenario) == "walk":
+        answer |= gait_summary(system, run)
     if as_json:
         show_json(answer)
     else:
@@ -93,6 +96,27 @@ def summary(run: Run, path: Path) -> dict[str, Any]:
     }
 
 
+def gait_summary(system: System, run: Run) -> dict[str, Any]:
+    """Return how a walk compares with its plan.
+
+    Args:
+        system: a design with a [walking] section.
+        run: the run.
+    """
+    walking = system.walking
+    assert walking is not None
+    case = WalkCase(
+        terrain=walking.terrain, gait=walking.gait, options=walking.options, steps=walking.steps
+    )
+    walk = measure_walk(system.robot, run, case, task=np.zeros((0, system.robot.n)))
+    return {
+        "steps": walk.steps,
+        "apex_speed_m_s": walk.apex_speed.tolist(),
+        "step_width_m": walk.step_width.tolist(),
+        "gait": walk.is_gait,
+    }
+
+
 def _show(run: Run, answer: dict[str, Any]) -> None:
     books = run.audit
     print(f"{'outcome':26} {answer['outcome']} {answer['message']}".rstrip())
@@ -117,4 +141,10 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
                 f"{answer['first_violation_s']:.3f} s, {answer['violating_joint']}"
             )
         print(f"{'controller side':26} {word}{where}")
+    if "steps" in answer:
+        speeds = ", ".join(f"{v:.2f}" for v in answer["apex_speed_m_s"])
+        widths = ", ".join(f"{w:.2f}" for w in answer["step_width_m"])
+        print(f"{'steps':26} {answer['steps']}{'' if answer['gait'] else ', not a gait'}")
+        print(f"{'apex speeds':26} {speeds} m/s")
+        print(f"{'step widths':26} {widths} m")
     print(f"{'recording':26} {answer['recording']}")

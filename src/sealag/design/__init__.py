@@ -10,14 +10,16 @@ from sealag.design._certify import (
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
 from sealag.design._project import System, load, resolve_project
-from sealag.design._simulate import simulate
+from sealag.design._simulate import scenario_duration, simulate, walk_scene
 from sealag.design._starter import starter_project
+from sealag.design._walking import Walking
 
 __all__ = [
     "ASYMMETRY_TOLERANCE",
     "Bounds",
     "LocalMargins",
     "System",
+    "Walking",
     "certified_bounds",
     "certify",
     "load",
@@ -27,6 +29,8 @@ __all__ = [
     "published_bounds",
     "resolve_project",
     "save_motion",
+    "scenario_duration",
     "simulate",
     "starter_project",
+    "walk_scene",
 ]

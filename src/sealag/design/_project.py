@@ -11,6 +11,7 @@ import numpy as np
 from sealag.actuation import Actuators, actuators
 from sealag.delay import Constant, Delays, DelaySignal, Sinusoid, Table, measured
 from sealag.design._schema import Project, SimulationSection
+from sealag.design._walking import Walking, walking_of
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
 from sealag.passivity import Criterion
 from sealag.robot import Contact, ContactKind, Motion, Robot, load_robot, resolve_urdf
@@ -48,6 +49,7 @@ class System:
         motion_file: the project's own motion, if it names one.
         sha256: of the project file; empty if the system was built in Python.
         simulation: the project's [simulation] section.
+        walking: the walk that the project describes; None if it has no [walking] section.
         text: the project file's own text, which recordings carry along.
     """
 
@@ -64,6 +66,7 @@ class System:
     motion_file: Path | None
     sha256: str
     simulation: SimulationSection
+    walking: Walking | None
     text: str
 
     def still(self) -> Motion:
@@ -165,7 +168,7 @@ def parse_project(content: bytes, path: Path) -> Any:
 def _first_problem(problems: list[Any], path: Path) -> str:
     first = problems[0]
     place = [str(part) for part in first["loc"]]
-    kinds = {"constant", "sinusoid", "table", "samples"}
+    kinds = {"constant", "sinusoid", "table", "samples", "paper", "flat", "rough", "stairs"}
     key = ".".join(
         part for part in place if part not in kinds and part != "list[constrained-float]"
     )
@@ -220,6 +223,7 @@ def _system(project: Any, path: Path, text: str) -> System:
         motion_file=folder / project.motion.file if project.motion else None,
         sha256=hashlib.sha256(text.encode()).hexdigest(),
         simulation=project.simulation,
+        walking=walking_of(project.walking, robot),
         text=text,
     )
 

@@ -150,10 +150,55 @@ class PushSection(Section):
     duration_s: Positive
 
 
+class PaperTerrain(Section):
+    """kind = "paper": up 9 cm, down 12 cm, up 9 cm"""
+
+    kind: Literal["paper"]
+
+
+class FlatTerrainKeys(Section):
+    """kind = "flat" """
+
+    kind: Literal["flat"]
+
+
+class RoughTerrain(Section):
+    """kind = "rough": random heights in ± amplitude"""
+
+    kind: Literal["rough"]
+    seed: Annotated[int, Field(ge=0)] = 0
+    amplitude_m: Positive = 0.05
+
+
+class StairsTerrain(Section):
+    """kind = "stairs": level treads"""
+
+    kind: Literal["stairs"]
+    rises_m: Annotated[list[FiniteFloat], Field(min_length=1)]
+    run_m: Positive = 0.45
+
+
+TerrainKeys = Annotated[
+    PaperTerrain | FlatTerrainKeys | RoughTerrain | StairsTerrain, Field(discriminator="kind")
+]
+
+
+class WalkingSection(Section):
+    """[walking]: the gait, the ground and the walking controller's means, by the names of
+    `WalkingGait` and `WalkingOptions`"""
+
+    feet: Annotated[list[str], Field(min_length=2, max_length=2)]
+    steps: Annotated[int, Field(ge=1, le=1000)] = 7
+    friction: Positive = 0.8
+    terrain: TerrainKeys = PaperTerrain(kind="paper")
+    gait: dict[str, FiniteFloat] = {}
+    options: dict[str, bool | FiniteFloat | str] = {}
+
+
 class SimulationSection(Section):
     """[simulation]: how `sealag simulate` runs the design"""
 
-    scenario: Literal["regulate", "track", "drop", "balance"] = "regulate"
+    scenario: Literal["regulate", "track", "drop", "balance", "walk"] = "regulate"
     duration_s: Positive = 2.0
     physics_step_ms: Annotated[FiniteFloat, Field(gt=0, le=10)] = 1.0
     central_period_ms: Annotated[FiniteFloat, Field(gt=0, le=100)] = 1.0
@@ -181,3 +226,4 @@ class Project(Section):
     delays: DelaysSection
     motion: MotionSection | None = None
     simulation: SimulationSection = SimulationSection()
+    walking: WalkingSection | None = None

@@ -1,14 +1,17 @@
 """A design in the simulator: regulate, track, drop and balance."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from sealag.design._project import System
-from sealag.errors import InputError
-from sealag.robot import ContactKind
+from sealag.design._walking import Walking
+from sealag.errors import InputError, either
+from sealag.locomotion import begin_walk
+from sealag.robot import Contact, ContactKind
 from sealag.simulation import (
     Clock,
     FallLimits,
@@ -23,6 +26,7 @@ from sealag.simulation import (
 from sealag.typing import Array
 from sealag.whole_body import Controller, ControllerOptions, TaskKind, TickController
 
+SCENARIOS = ("regulate", "track", "drop", "balance", "walk")
 _FALL = FallLimits()
 
 
@@ -39,12 +43,13 @@ def simulate(
 
     Scenarios: `regulate` holds the posture while the project's pushes act; `balance` does so with
     a push of 5 % of the weight for 0.1 s if the project has none; `track` moves the first task's
-    first row as a sinusoid; `drop` begins above the ground with the springs at rest.
+    first row as a sinusoid; `drop` begins above the ground with the springs at rest; `walk` takes
+    the steps of the project's [walking] section.
 
     Args:
         system: the design.
-        scenario: one of the four; the project's if None.
-        duration: s; the project's if None.
+        scenario: one of the five; the project's if None.
+        duration: s; the project's, or the walk's, if None.
         seed: of jitter and losses; the project's if None.
         delay_scale: factor on both round trips.
         progress: called with the simulated time.
@@ -58,8 +63,19 @@ def simulate(
     """
     setting = system.simulation
     kind = scenario or setting.scenario
-    if kind not in ("regulate", "track", "drop", "balance"):
-        raise InputError(f"The scenario is {kind!r}; it must be regulate, track, drop or balance.")
+    if kind not in SCENARIOS:
+        raise InputError(f"The scenario is {kind!r}; it must be {either(SCENARIOS)}.")
+    length = scenario_duration(system, kind) if duration is None else duration
+    clock = Clock(physics=setting.physics_step_ms * 1e-3, central=setting.central_period_ms * 1e-3)
+    common = {
+        "duration": length,
+        "network": _network(system, delay_scale),
+        "clock": clock,
+        "seed": setting.seed if seed is None else seed,
+        "progress": progress,
+    }
+    if kind == "walk":
+        return _walk(system, common)
     feet = _feet(system)
     q = _on_ground(system)
     scene = Scene(feet=feet, pushes=_pushes(system, kind), fall=_FALL)
@@ -80,14 +96,72 @@ def simulate(
         system.actuators,
         controller,
         q=q,
-        duration=setting.duration_s if duration is None else duration,
-        network=_network(system, delay_scale),
-        clock=Clock(
-            physics=setting.physics_step_ms * 1e-3, central=setting.central_period_ms * 1e-3
-        ),
         scene=scene,
-        seed=setting.seed if seed is None else seed,
-        progress=progress,
+        **common,
+    )
+
+
+def scenario_duration(system: System, scenario: str | None = None) -> float:
+    """Return how long a scenario runs unless told otherwise, s.
+
+    Args:
+        system: the design.
+        scenario: its name; the project's if None.
+
+    Raises:
+        InputError: it is a walk and the project describes none.
+    """
+    kind = scenario or system.simulation.scenario
+    return _walking(system).duration if kind == "walk" else system.simulation.duration_s
+
+
+def _walking(system: System) -> Walking:
+    if system.walking is None:
+        raise InputError(
+            f"The project {system.name} has no [walking] section; give its feet = [left, right]."
+        )
+    return system.walking
+
+
+def walk_scene(walking: Walking, pushes: Sequence[Push] = ()) -> Scene:
+    """Return what surrounds a walk: its ground and two point feet.
+
+    Args:
+        walking: the walk.
+        pushes: disturbing forces.
+    """
+    feet = [
+        Foot(
+            contact=Contact(frame=frame, kind=ContactKind.POINT),
+            friction=walking.friction,
+            radius=walking.gait.foot_radius,
+        )
+        for frame in walking.feet
+    ]
+    return Scene(feet=feet, ground=walking.terrain, pushes=pushes)
+
+
+def _walk(system: System, common: dict[str, Any]) -> Run:
+    walking = _walking(system)
+    controller, q, v, theta = begin_walk(
+        system.robot,
+        system.actuators,
+        walking.terrain,
+        feet=walking.feet,
+        gait=walking.gait,
+        options=walking.options,
+        period=common["clock"].central,
+    )
+    return closed_loop(
+        system.robot,
+        system.actuators,
+        controller,
+        q=q,
+        v=v,
+        theta=theta,
+        theta_dot=v[-system.robot.n :],
+        scene=walk_scene(walking, _pushes(system, "walk")),
+        **common,
     )
 
 

@@ -10,7 +10,7 @@ from sealag.locomotion._terrain import (
     stairs,
 )
 from sealag.locomotion._walk_motion import walk_motion
-from sealag.locomotion._walking import WalkingController
+from sealag.locomotion._walking import WalkingController, begin_walk
 from sealag.locomotion._walking_options import Prediction, WalkingGait, WalkingOptions
 from sealag.locomotion._walking_placement import PeriodicGait, periodic_gait
 from sealag.locomotion._walking_start import walking_start
@@ -26,6 +26,7 @@ __all__ = [
     "WalkingController",
     "WalkingGait",
     "WalkingOptions",
+    "begin_walk",
     "paper_terrain",
     "periodic_gait",
     "plan_walk",

@@ -9,6 +9,7 @@ from sealag.errors import InputError, SolverError
 from sealag.locomotion._terrain import Terrain
 from sealag.locomotion._walking_options import Prediction, WalkingGait, WalkingOptions
 from sealag.locomotion._walking_placement import Placement
+from sealag.locomotion._walking_start import walking_start
 from sealag.locomotion._walking_state import Body, Odometry, Predictor, tilt
 from sealag.locomotion._walking_step import StepReferences
 from sealag.robot import Robot
@@ -271,3 +272,37 @@ class WalkingController:
         if options.torque_feedback > 0.0:
             command += options.torque_feedback * (tau - self._predictor.tau_sea)
         return command
+
+
+def begin_walk(
+    robot: Robot,
+    actuators: Actuators,
+    terrain: Terrain,
+    *,
+    feet: tuple[str, str] = ("left_foot", "right_foot"),
+    gait: WalkingGait | None = None,
+    options: WalkingOptions | None = None,
+    period: float = 1e-3,
+) -> tuple[WalkingController, Array, Array, Array]:
+    """Return a walking controller and the state in which its walk begins.
+
+    Args:
+        robot: Biped with a floating base and six joints.
+        actuators: Springs and motors as the controller believes them to be.
+        terrain: The ground.
+        feet: Frames of the left and the right foot.
+        gait: The plan.
+        options: Means and gains of the controller.
+        period: Time between two ticks, s.
+
+    Returns:
+        The controller, q (nq,), v (nv,) and motor angles (n,) that carry the first torque, rad.
+
+    Raises:
+        InputError: The robot is not such a biped, or its legs cannot take the posture.
+    """
+    controller = WalkingController(
+        robot, actuators, terrain, feet=feet, gait=gait, options=options, period=period
+    )
+    q, v = walking_start(robot, terrain, gait=controller.gait, feet=feet)
+    return controller, q, v, controller.motor_start(q, v)

@@ -6,26 +6,24 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sealag.delay import Delays, DelaySignal
-from sealag.design import System
+from sealag.design import System, Walking, walk_scene
 from sealag.locomotion import (
     Terrain,
     WalkingController,
     WalkingGait,
     WalkingOptions,
+    begin_walk,
     paper_terrain,
-    walking_start,
 )
 from sealag.paper._walk_errors import NoisySensors, SensorNoise, wrong_robot, wrong_springs
-from sealag.robot import Contact, ContactKind, Robot
+from sealag.robot import Robot
 from sealag.simulation import (
     Clock,
     EventKind,
-    Foot,
     Network,
     Outcome,
     Push,
     Run,
-    Scene,
     closed_loop,
 )
 from sealag.typing import Array
@@ -193,11 +191,9 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
     if case.inertia_shaping is not None:
         shaped = case.inertia_shaping * believed.rotor_inertia
         believed = replace(believed, shaped_inertia=shaped)
-    controller = WalkingController(
+    controller, q, v, theta = begin_walk(
         robot, believed, case.terrain, feet=FEET, gait=case.gait, options=case.options
     )
-    q, v = walking_start(robot, case.terrain, gait=case.gait, feet=FEET)
-    theta = controller.motor_start(q, v)
     plant, springs = robot, believed
     if case.model_error > 0.0:
         plant = wrong_robot(robot, error=case.model_error, seed=case.seed)
@@ -214,10 +210,10 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
         v=v,
         theta=theta,
         theta_dot=v[-robot.n :],
-        duration=round((case.steps + 0.5) * case.gait.step_time, 3),
+        duration=_walking(case).duration,
         network=_network(system.delays, case.delay_scale),
         clock=Clock(physics=case.physics, embedded=case.embedded, central=TICK),
-        scene=_scene(case),
+        scene=walk_scene(_walking(case), case.pushes),
         seed=case.seed,
         log_period=case.log_period,
     )
@@ -251,16 +247,15 @@ def _network(delays: Delays, factor: float) -> Network:
     )
 
 
-def _scene(case: WalkCase) -> Scene:
-    feet = [
-        Foot(
-            contact=Contact(frame=frame, kind=ContactKind.POINT),
-            friction=case.friction,
-            radius=case.gait.foot_radius,
-        )
-        for frame in FEET
-    ]
-    return Scene(feet=feet, ground=case.terrain, pushes=case.pushes)
+def _walking(case: WalkCase) -> Walking:
+    return Walking(
+        feet=FEET,
+        steps=case.steps,
+        friction=case.friction,
+        terrain=case.terrain,
+        gait=case.gait,
+        options=case.options,
+    )
 
 
 def measure_walk(robot: Robot, run: Run, case: WalkCase, *, task: Array) -> Walk:
@@ -275,18 +270,18 @@ def measure_walk(robot: Robot, run: Run, case: WalkCase, *, task: Array) -> Walk
         case: What was asked for.
         task: Task torque of every tick (T, n), Nm.
     """
-    at = robot.workspace()
+    at, names = robot.workspace(), tuple(dict.fromkeys(run.feet))
     count = len(run.time)
     com, speed, feet = np.zeros((count, 3)), np.zeros(count), np.zeros((count, 2, 3))
     for i in range(count):
         at.update(run.q[i], run.v[i])
         com[i], speed[i] = at.com, at.com_velocity[0]
-        for f, frame in enumerate(FEET):
+        for f, frame in enumerate(names):
             feet[i, f] = at.frame_placement(frame)[1]
     first = int(run.contact_mode[0].argmax())
     times, foot = [0.0], [first]
     for event in run.events:
-        f = FEET.index(event.foot)
+        f = names.index(event.foot)
         late = event.time - times[-1] > 0.3 * case.gait.step_time
         if event.kind == EventKind.TOUCHDOWN and f != foot[-1] and late:
             times.append(event.time)

@@ -1,10 +1,9 @@
 """Reading a URDF: finding it, checking it, locking what is not actuated."""
 
-import difflib
 import hashlib
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
@@ -14,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from sealag.errors import FileError, RobotError, UnknownNameError
+from sealag.errors import FileError, RobotError, UnknownNameError, either, near
 
 LARGEST_URDF_BYTES = 50_000_000
 
@@ -32,7 +31,7 @@ def bundled_robot_path(name: str) -> Path:
     path = folder / (name if name.endswith(".urdf") else f"{name}.urdf")
     if not path.is_file():
         known = [found.stem for found in folder.glob("*.urdf")]
-        raise UnknownNameError(f"No bundled robot is called {name!r}; there is {_or(known)}.")
+        raise UnknownNameError(f"No bundled robot is called {name!r}; there is {either(known)}.")
     return path
 
 
@@ -77,26 +76,6 @@ def resolve_urdf(text: str, *, relative_to: Path = Path()) -> Path:
     if text.startswith("example-robot-data:"):
         return example_robot_path(text.removeprefix("example-robot-data:"))
     return relative_to / Path(text).expanduser()
-
-
-def near(name: str, known: Iterable[str], *, what: str) -> UnknownNameError:
-    """Make the error for a name that does not exist, with near matches.
-
-    Args:
-        name: what was asked for.
-        known: the names that exist.
-        what: such as "joint" or "frame".
-    """
-    known = list(known)
-    matches = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
-    hint = f"did you mean {_or(matches)}?" if matches else f"there is {_or(known[:12])}."
-    return UnknownNameError(f"No {what} is called {name!r}; {hint}")
-
-
-def _or(names: Sequence[str]) -> str:
-    if not names:
-        return "none"
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def read_model(path: Path, *, floating_base: bool) -> tuple[Any, str]:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from sealag.errors import InputError, RobotError
+from sealag.errors import InputError, RobotError, near
 from sealag.robot._contact import Contact
-from sealag.robot._load import near, read_model, reduce_model, resolve_urdf
+from sealag.robot._load import read_model, reduce_model, resolve_urdf
 from sealag.robot._workspace import Workspace
 from sealag.typing import Array, ArrayLike
 
