@@ -78,7 +78,7 @@ def test_the_bundled_walk_is_the_default_one():
 def test_same_seed_same_run(tmp_path, capsys):
     text = (EXAMPLES / "baxter.toml").read_text()
     path = tmp_path / "noisy.toml"
-    path.write_text(text + "\n[simulation]\njitter_ms = 3.0\npacket_loss = 0.1\n")
+    path.write_text(text.replace("value_ms", "jitter_ms = 3.0, packet_loss = 0.1, value_ms", 1))
     ages = []
     for seed in ("1", "1", "2"):
         out = tmp_path / "run.mcap"

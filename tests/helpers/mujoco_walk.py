@@ -243,15 +243,15 @@ def mujoco_walk(system: System, case: WalkCase, *, step: float) -> MujocoWalk:
         seen.contact[:] = feet.loaded()
         return seen
 
-    delays, share = system.delays, system.delays.up_share
+    central, embedded = system.delays.central, system.delays.embedded
     first, command = measure(0.0), np.zeros(robot.n)
     controller.reset(0.0, first)
     controller.tick(0.0, first, command)
     controller.reset(0.0, first)
     twin.fill_delay(command)
-    up = Queue(lambda t: (1.0 - share) * delays.central.at(t), first)
-    down = Queue(lambda t: share * delays.central.at(t), 0.0)
-    drive = Queue(lambda t: 0.5 * delays.embedded.at(t), 0.0)
+    up = Queue(central.up.delay.at, first)
+    down = Queue(central.down.delay.at, 0.0)
+    drive = Queue(embedded.down.delay.at, 0.0)
     ticks = round((case.steps + 0.5) * case.gait.step_time / TICK)
     rows = []
     for k in range(ticks):

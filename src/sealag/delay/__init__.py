@@ -1,10 +1,11 @@
 """Delays over time, the bounds that the criterion needs, and links that carry packets late."""
 
+from sealag.delay._delays import Delays, RoundTrip
 from sealag.delay._line import DelayLine, Link, PacketOrder
 from sealag.delay._signal import (
     Constant,
-    Delays,
     DelaySignal,
+    Share,
     Sinusoid,
     Table,
     measured,
@@ -17,6 +18,8 @@ __all__ = [
     "Delays",
     "Link",
     "PacketOrder",
+    "RoundTrip",
+    "Share",
     "Sinusoid",
     "Table",
     "measured",

@@ -54,18 +54,33 @@ class Link:
             raise InputError(f"max_burst must be at least 1 packet, got {self.max_burst}")
         object.__setattr__(self, "order", PacketOrder(self.order))
 
+    def late_bound(self, period: float) -> float:
+        """Return an upper bound (s) on how late the newest packet is, its successors' losses too.
+
+        Delay, jitter and the longest burst of losses; under ARRIVAL an overtaken packet may be
+        older by the jitter once more.
+
+        Args:
+            period: Time between two packets, s.
+
+        Raises:
+            InputError: Packets are lost but have no period.
+        """
+        lost = self.max_burst if self.loss > 0 else 0
+        if lost and not period > 0.0:
+            raise InputError("lost packets have a bound only if packets have a period (> 0 s)")
+        late = self.jitter if self.order == PacketOrder.ARRIVAL else 0.0
+        return self.delay.upper_bound + self.jitter + late + lost * period
+
     def age_bound(self, period: float) -> float:
         """Return an upper bound (s) on the age of what the receiver holds, always.
 
-        Holds for FIFO and NEWEST. Delay, jitter, the hold until the next packet and the longest
-        burst of losses; under ARRIVAL an overtaken packet may be older by the jitter once more.
+        `late_bound` and the hold until the next packet.
 
         Args:
             period: Time between two packets, s.
         """
-        lost = self.max_burst if self.loss > 0 else 0
-        late = self.jitter if self.order == PacketOrder.ARRIVAL else 0.0
-        return self.delay.upper_bound + self.jitter + late + (1 + lost) * period
+        return self.late_bound(period) + period
 
     def arrivals(self, times: Array, rng: np.random.Generator, *, after: int = 0) -> Array:
         """Draw when packets sent at ``times`` (N,) arrive (N,), s; inf where lost.

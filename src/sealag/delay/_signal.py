@@ -1,4 +1,4 @@
-"""Delays as functions of time, and the three delays of the paper's criterion."""
+"""Delays as functions of time."""
 
 import math
 from dataclasses import dataclass
@@ -190,63 +190,41 @@ def measured(samples: ArrayLike, *, period: float, quantile: float = 1.0) -> Tab
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Delays:
-    """The delays of both loops, and what the criterion needs of them.
-
-    d_0 = d_1 = T_H + T_L/2 is the total delay of the position feedback, d_2 = (T_H + T_L)/2 that
-    of the feedforward path. A sampled controller's zero-order hold adds its period to each. With
-    asymmetric links only d_2 changes: d_1 is the sum around the loop.
+class Share:
+    """A constant multiple of another delay signal.
 
     Attributes:
-        central: T_H, round trip of the central loop.
-        embedded: T_L, round trip of the embedded loop.
-        sample_time: period of the central controller, 0 for a continuous one, s.
-        up_share: share of each round trip that lies between controller and motor.
+        signal: the whole delay.
+        fraction: what multiple of it.
+
+    Raises:
+        InputError: the fraction is negative or not finite.
     """
 
-    central: DelaySignal
-    embedded: DelaySignal
-    sample_time: float = 0.0
-    up_share: float = 0.5
+    signal: DelaySignal
+    fraction: float
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            InputError: the sample time cannot be one, or the share is outside 0 … 1.
-        """
-        check_delay_s(self.sample_time, "The sample time")
-        if not 0.0 <= self.up_share <= 1.0:
-            raise InputError(f"up_share is {self.up_share:g}; it must lie in 0 … 1.")
+        """Check the fraction."""
+        if not (math.isfinite(self.fraction) and self.fraction >= 0.0):
+            raise InputError(
+                f"The share of a delay is {self.fraction}; 0 or a positive number is needed."
+            )
 
     @property
-    def d_0(self) -> float:
-        """Upper bound of T_H + T_L/2 plus the hold, s."""
-        return self.d_1
+    def upper_bound(self) -> float:
+        """The multiple of the signal's upper bound, s."""
+        return self.fraction * self.signal.upper_bound
 
     @property
-    def d_1(self) -> float:
-        """Upper bound of the position feedback's total delay, s."""
-        return self.central.upper_bound + 0.5 * self.embedded.upper_bound + self.sample_time
+    def mean(self) -> float:
+        """The multiple of the signal's mean, s."""
+        return self.fraction * self.signal.mean
 
-    @property
-    def d_2(self) -> float:
-        """Upper bound of the feedforward path's delay, s."""
-        both = self.central.upper_bound + self.embedded.upper_bound
-        return self.up_share * both + self.sample_time
-
-    def d_1_at(self, t: float | Array) -> float | Array:
-        """Return the position feedback's total delay with its mean hold of half a period.
+    def at(self, t: float | Array) -> Any:
+        """Return the multiple of the delay.
 
         Args:
             t: s.
         """
-        return self.central.at(t) + 0.5 * self.embedded.at(t) + 0.5 * self.sample_time
-
-    def d_2_at(self, t: float | Array) -> float | Array:
-        """Return the feedforward path's delay with its mean hold of half a period.
-
-        Args:
-            t: s.
-        """
-        return self.up_share * (self.central.at(t) + self.embedded.at(t)) + 0.5 * self.sample_time
+        return self.fraction * self.signal.at(t)

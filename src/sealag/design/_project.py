@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 
 from sealag.actuation import Actuators, actuators
-from sealag.delay import Constant, Delays, DelaySignal, Sinusoid, Table, measured
+from sealag.delay import (
+    Constant,
+    Delays,
+    DelaySignal,
+    Link,
+    PacketOrder,
+    RoundTrip,
+    Sinusoid,
+    Table,
+    measured,
+)
 from sealag.design._schema import Project, SimulationSection
 from sealag.design._walking import Walking, walking_of
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
@@ -219,7 +229,7 @@ def _system(project: Any, path: Path, text: str) -> System:
         feedback=Feedback(project.controller.feedback),
         gravity=GravityCompensation(project.controller.gravity),
         criterion=Criterion(project.controller.criterion),
-        delays=_delays(project.delays, folder),
+        delays=_delays(project.delays, folder, path),
         motion_file=folder / project.motion.file if project.motion else None,
         sha256=hashlib.sha256(text.encode()).hexdigest(),
         simulation=project.simulation,
@@ -268,13 +278,42 @@ def _actuators(section: Any, robot: Robot, path: Path) -> Actuators:
     return actuators(robot.joints, **columns)
 
 
-def _delays(section: Any, folder: Path) -> Delays:
+def _delays(section: Any, folder: Path, path: Path) -> Delays:
     return Delays(
-        central=_signal(section.central_round_trip, folder),
-        embedded=_signal(section.embedded_round_trip, folder),
+        central=_connection(section, "central", folder, path),
+        embedded=_connection(section, "embedded", folder, path),
         sample_time=section.sample_time_ms * 1e-3,
-        up_share=section.up_share,
+        embedded_period=section.embedded_period_ms * 1e-3,
+        delayed_torque_feedback=section.delayed_torque_feedback,
     )
+
+
+def _connection(section: Any, name: str, folder: Path, path: Path) -> RoundTrip:
+    """A connection from its round trip, or from both of its ways."""
+    whole, up, down = (getattr(section, f"{name}_{way}") for way in ("round_trip", "up", "down"))
+    if whole is not None and up is None and down is None:
+        return RoundTrip.halved(_signal(whole, folder), **_packets(whole))
+    if whole is None and up is not None and down is not None:
+        return RoundTrip(
+            **{
+                way: Link(delay=_signal(keys, folder), **_packets(keys))
+                for way, keys in (("up", up), ("down", down))
+            }
+        )
+    said = "missing" if whole is None else "given besides one of its ways"
+    raise ProjectError(
+        f"{path}: the key delays.{name}_round_trip is {said}; give it alone, or both {name}_up and "
+        f"{name}_down."
+    )
+
+
+def _packets(keys: Any) -> dict[str, Any]:
+    return {
+        "jitter": keys.jitter_ms * 1e-3,
+        "loss": keys.packet_loss,
+        "max_burst": keys.max_burst,
+        "order": PacketOrder(keys.order),
+    }
 
 
 def _signal(section: Any, folder: Path) -> DelaySignal:

@@ -87,14 +87,23 @@ class TaskSection(Section):
     priority: Annotated[int, Field(ge=1)] = 1
 
 
-class ConstantDelay(Section):
+class DelayTable(Section):
+    """What any delay's table may say about packets; of a round trip it holds for each way"""
+
+    jitter_ms: Milliseconds = 0.0
+    packet_loss: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
+    max_burst: Annotated[int, Field(ge=1)] = 10
+    order: Literal["fifo", "newest", "arrival"] = "fifo"
+
+
+class ConstantDelay(DelayTable):
     """kind = "constant" """
 
     kind: Literal["constant"]
     value_ms: Milliseconds
 
 
-class SinusoidDelay(Section):
+class SinusoidDelay(DelayTable):
     """kind = "sinusoid": mean + amplitude sin(ω t + phase)"""
 
     kind: Literal["sinusoid"]
@@ -104,7 +113,7 @@ class SinusoidDelay(Section):
     phase_rad: FiniteFloat = 0.0
 
 
-class TableDelay(Section):
+class TableDelay(DelayTable):
     """kind = "table": linear between instants"""
 
     kind: Literal["table"]
@@ -112,7 +121,7 @@ class TableDelay(Section):
     delay_ms: list[Milliseconds]
 
 
-class SamplesDelay(Section):
+class SamplesDelay(DelayTable):
     """kind = "samples": measured round trips, one a line, in ms"""
 
     kind: Literal["samples"]
@@ -127,12 +136,17 @@ DelayKeys = Annotated[
 
 
 class DelaysSection(Section):
-    """[delays]"""
+    """[delays]: each connection as a round trip, or both of its ways"""
 
-    central_round_trip: DelayKeys
-    embedded_round_trip: DelayKeys
+    central_round_trip: DelayKeys | None = None
+    central_up: DelayKeys | None = None
+    central_down: DelayKeys | None = None
+    embedded_round_trip: DelayKeys | None = None
+    embedded_up: DelayKeys | None = None
+    embedded_down: DelayKeys | None = None
     sample_time_ms: Milliseconds = 0.0
-    up_share: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.5
+    embedded_period_ms: Milliseconds = 0.0
+    delayed_torque_feedback: bool = False
 
 
 class MotionSection(Section):
@@ -200,16 +214,16 @@ class SimulationSection(Section):
 
     scenario: Literal["regulate", "track", "drop", "balance", "walk"] = "regulate"
     duration_s: Positive = 2.0
-    physics_step_ms: Annotated[FiniteFloat, Field(gt=0, le=10)] = 1.0
-    central_period_ms: Annotated[FiniteFloat, Field(gt=0, le=100)] = 1.0
+    physics_step_ms: Annotated[FiniteFloat, Field(gt=0, le=10)] | None = None
     friction: Positive = 0.8
+    foot_radius: NotNegative = 0.0
     foot_half_length: Positive = 0.1
     foot_half_width: Positive = 0.06
+    torsional_damping: NotNegative = 0.0
+    torsional_radius: Positive | None = None
     drop_height: NotNegative = 0.03
     track_amplitude: NotNegative = 0.02
     track_frequency_hz: Positive = 0.5
-    jitter_ms: Milliseconds = 0.0
-    packet_loss: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
     seed: Annotated[int, Field(ge=0)] = 0
     pushes: list[PushSection] = []
 

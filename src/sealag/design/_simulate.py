@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,9 @@ from sealag.typing import Array
 from sealag.whole_body import Controller, ControllerOptions, TaskKind, TickController
 
 SCENARIOS = ("regulate", "track", "drop", "balance", "walk")
+LONGEST_STEP = 1e-3
+"""Physics step and central period where the project states none, s."""
+
 _FALL = FallLimits()
 
 
@@ -65,12 +67,13 @@ def simulate(
     kind = scenario or setting.scenario
     if kind not in SCENARIOS:
         raise InputError(f"The scenario is {kind!r}; it must be {either(SCENARIOS)}.")
+    if not (math.isfinite(delay_scale) and delay_scale >= 0.0):
+        raise InputError(f"delay_scale is {delay_scale}; it must be 0 or a positive number.")
     length = scenario_duration(system, kind) if duration is None else duration
-    clock = Clock(physics=setting.physics_step_ms * 1e-3, central=setting.central_period_ms * 1e-3)
     common = {
         "duration": length,
-        "network": _network(system, delay_scale),
-        "clock": clock,
+        "network": Network.from_delays(system.delays.scaled(delay_scale)),
+        "clock": _clock(system),
         "seed": setting.seed if seed is None else seed,
         "progress": progress,
     }
@@ -201,6 +204,11 @@ def _feet(system: System) -> list[Foot]:
         Foot(
             contact=contact,
             friction=setting.friction,
+            radius=setting.foot_radius,
+            torsional_damping=setting.torsional_damping,
+            torsional_radius=math.inf
+            if setting.torsional_radius is None
+            else setting.torsional_radius,
             half_length=setting.foot_half_length if contact.kind is ContactKind.SURFACE else 0.0,
             half_width=setting.foot_half_width if contact.kind is ContactKind.SURFACE else 0.0,
         )
@@ -209,10 +217,10 @@ def _feet(system: System) -> list[Foot]:
 
 
 def _on_ground(system: System) -> Array:
-    """The posture with its lowest contact frame at height 0."""
+    """The posture with its lowest contact frame as high as a touching foot."""
     q = system.posture.copy()
     if system.robot.floating_base and system.contacts:
-        q[2] -= min(
+        q[2] += system.simulation.foot_radius - min(
             system.robot.frame_placement(contact.frame, q)[1][2] for contact in system.contacts
         )
     return q
@@ -236,19 +244,15 @@ def _pushes(system: System, kind: str) -> list[Push]:
     return pushes
 
 
-def _network(system: System, scale: float) -> Network:
-    if not (math.isfinite(scale) and scale >= 0.0):
-        raise InputError(f"delay_scale is {scale}; it must be 0 or a positive number.")
-    network = Network.from_delays(
-        system.delays,
-        jitter=system.simulation.jitter_ms * 1e-3,
-        loss=system.simulation.packet_loss,
+def _clock(system: System) -> Clock:
+    """The design's own periods; 1 ms for a continuous controller, and physics at 1 ms at most."""
+    delays = system.delays
+    central = delays.sample_time or delays.embedded_period or LONGEST_STEP
+    embedded = delays.embedded_period
+    step = system.simulation.physics_step_ms
+    if step is not None:
+        return Clock(physics=step * 1e-3, embedded=embedded, central=central)
+    whole = embedded or central
+    return Clock(
+        physics=whole / math.ceil(whole / LONGEST_STEP - 1e-9), embedded=embedded, central=central
     )
-    if scale == 1.0:
-        return network
-    stretch = {
-        name: replace(link, delay=replace(link.delay, fraction=scale * link.delay.fraction))
-        for name in ("central_up", "central_down", "embedded_down")
-        if (link := getattr(network, name)) is not None
-    }
-    return replace(network, **stretch)

@@ -134,7 +134,7 @@ class _Loop:
             )
 
         central, embedded = clock.central, clock.embedded
-        self._up = line(network.central_up, self.truth.data.size, central, central, streams[0])
+        self._up = line(network.central_up, self.truth.data.size, embedded, central, streams[0])
         self._down = line(network.central_down, n + 1, central, embedded, streams[1])
         self._drive = line(network.embedded_down, n + 1, embedded, embedded, streams[2])
         self._torque = None
@@ -230,9 +230,10 @@ class _Loop:
         t = i * self.clock.physics
         if i % self._watch_steps == 0:
             self._watch()
-        if i % self._central_steps == 0:
+        if i % self._embedded_steps == 0:
             self._sense(t)
             self._up.send(t, self.truth.data)
+        if i % self._central_steps == 0:
             self._up.receive(t, self.received.data)
             self.controller.tick(t, self.received, self.command[1:])
             self.command[0] = t

@@ -2,38 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
-from sealag.delay import Constant, Delays, DelaySignal, Link, PacketOrder
+from sealag.delay import Constant, Delays, Link, RoundTrip
 from sealag.errors import InputError
-from sealag.typing import Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Share:
-    """A constant fraction of another delay signal.
-
-    Attributes:
-        signal: The whole delay.
-        fraction: What part of it, >= 0.
-    """
-
-    signal: DelaySignal
-    fraction: float
-
-    @property
-    def upper_bound(self) -> float:
-        """Upper bound of the fraction, s."""
-        return self.fraction * self.signal.upper_bound
-
-    @property
-    def mean(self) -> float:
-        """Mean of the fraction, s."""
-        return self.fraction * self.signal.mean
-
-    def at(self, t: float | Array) -> Any:
-        """Return the fraction of the delay at ``t`` (s)."""
-        return self.fraction * self.signal.at(t)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,40 +35,18 @@ class Network:
         return cls(central_up=link, central_down=link, embedded_down=link)
 
     @classmethod
-    def from_delays(
-        cls,
-        delays: Delays,
-        *,
-        jitter: float = 0.0,
-        loss: float = 0.0,
-        max_burst: int = 10,
-        order: PacketOrder = PacketOrder.FIFO,
-    ) -> Self:
-        """Share T_H between the central links and give half of T_L to the way down.
-
-        The total is d_1 = T_H + T_L / 2 besides sampling, however T_H is shared.
+    def from_delays(cls, delays: Delays) -> Self:
+        """Return the links of a design's delays.
 
         Args:
-            delays: The round trips; ``up_share`` is the part of T_H on the way to the motors.
-            jitter: Random delay of each central packet, uniform in [0, jitter], s.
-            loss: Probability that a central packet is lost.
-            max_burst: Largest number of central packets lost in a row.
-            order: What central packets that overtake each other do.
+            delays: Both connections.
         """
-
-        def central(fraction: float) -> Link:
-            return Link(
-                delay=Share(signal=delays.central, fraction=fraction),
-                jitter=jitter,
-                loss=loss,
-                max_burst=max_burst,
-                order=order,
-            )
-
+        late = delays.delayed_torque_feedback
         return cls(
-            central_up=central(1.0 - delays.up_share),
-            central_down=central(delays.up_share),
-            embedded_down=Link(delay=Share(signal=delays.embedded, fraction=0.5)),
+            central_up=delays.central.up,
+            central_down=delays.central.down,
+            embedded_down=delays.embedded.down,
+            embedded_up=delays.embedded.up if late else None,
         )
 
     def delay_bound(self, clock: "Clock") -> float:
@@ -105,12 +55,12 @@ class Network:
         Args:
             clock: How often packets are sent and looked for.
         """
-        return (
-            self.central_up.age_bound(clock.central)
-            + self.central_down.age_bound(clock.central)
-            + self.embedded_down.age_bound(clock.embedded)
-            + clock.embedded
-        )
+        return Delays(
+            central=RoundTrip(up=self.central_up, down=self.central_down),
+            embedded=RoundTrip(up=self.embedded_down, down=self.embedded_down),
+            sample_time=clock.central,
+            embedded_period=clock.embedded,
+        ).d_1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,8 +69,9 @@ class Clock:
 
     Attributes:
         physics: Step of the plant, s.
-        embedded: Period at which the drives read the network, s; default the physics step.
-        central: Period of the central controller and of the measurements, s.
+        embedded: Period at which measurements are sent and the drives look for commands, s;
+            default the physics step.
+        central: Period of the central controller, s.
 
     Raises:
         InputError: A period is not positive or not a whole multiple.
@@ -139,6 +90,11 @@ class Clock:
                 raise InputError(f"the {name} period must be a time > 0 s, got {value}")
         self.steps_of("embedded", self.embedded)
         self.steps_of("central", self.central)
+        if self.steps_of("central", self.central) % self.steps_of("embedded", self.embedded):
+            raise InputError(
+                f"the central period {self.central:g} s must be a whole multiple of the embedded "
+                f"period {self.embedded:g} s"
+            )
 
     def steps_of(self, name: str, period: float) -> int:
         """Return how many physics steps a period has.

@@ -1,0 +1,196 @@
+"""The delays of both loops, and the three delays of the paper's criterion."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+from sealag.delay._line import Link, PacketOrder
+from sealag.delay._signal import DelaySignal, Share
+from sealag.errors import InputError
+from sealag.typing import Array
+from sealag.units import check_delay_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoundTrip:
+    """Both directions of one network connection.
+
+    It is a delay signal itself: the sum of both ways, without jitter and losses.
+
+    Attributes:
+        up: from the robot to the controller.
+        down: from the controller to the robot.
+    """
+
+    up: Link
+    down: Link
+
+    @classmethod
+    def halved(
+        cls,
+        signal: DelaySignal,
+        *,
+        jitter: float = 0.0,
+        loss: float = 0.0,
+        max_burst: int = 10,
+        order: PacketOrder = PacketOrder.FIFO,
+    ) -> Self:
+        """Give half of a round trip to each way; what happens to packets holds for each way.
+
+        Args:
+            signal: the whole round trip.
+            jitter: random delay of each packet, uniform in [0, jitter], s.
+            loss: probability that a packet is lost.
+            max_burst: largest number of packets lost in a row.
+            order: what packets that overtake each other do.
+        """
+        half = Share(signal=signal, fraction=0.5)
+        link = Link(delay=half, jitter=jitter, loss=loss, max_burst=max_burst, order=order)
+        return cls(up=link, down=link)
+
+    @property
+    def upper_bound(self) -> float:
+        """Sum of both ways' largest delays, s."""
+        return self.up.delay.upper_bound + self.down.delay.upper_bound
+
+    @property
+    def mean(self) -> float:
+        """Sum of both ways' mean delays, s."""
+        return self.up.delay.mean + self.down.delay.mean
+
+    def at(self, t: float | Array) -> Any:
+        """Return the sum of both ways' delays.
+
+        Args:
+            t: s.
+        """
+        return self.up.delay.at(t) + self.down.delay.at(t)
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same connection with delays and jitter times a factor.
+
+        Args:
+            factor: at least 0.
+
+        Raises:
+            InputError: the factor is negative or not finite.
+        """
+        return replace(self, up=_scaled(self.up, factor), down=_scaled(self.down, factor))
+
+
+def _scaled(link: Link, factor: float) -> Link:
+    return replace(
+        link, delay=Share(signal=link.delay, fraction=factor), jitter=factor * link.jitter
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Delays:
+    """The delays of both loops, and what the criterion needs of them.
+
+    d_0 = d_1 = T_H + T_L/2 is the total delay of the position feedback: both ways of the central
+    connection and the embedded one's way down. d_2 = (T_H + T_L)/2 is that of the feedforward
+    path: both ways down. The central controller's zero-order hold adds its period to each; a
+    declared embedded period adds the time that each receiver may wait until it looks. Jitter and
+    bursts of losses count with their bounds, so that all three bound a time-varying delay.
+
+    Attributes:
+        central: T_H, connection of the central controller; a plain signal is a round trip whose
+            ways are alike.
+        embedded: T_L, connection of the motor drives.
+        sample_time: T_s, period of the central controller, 0 for a continuous one, s.
+        embedded_period: T_e, period at which packets are sent and looked for on the robot's side,
+            0 for at once, s.
+        delayed_torque_feedback: whether the embedded torque feedback waits for the way up of the
+            embedded connection; the criterion assumes that it does not.
+
+    Raises:
+        InputError: a period cannot be one, or packets without a period are lost.
+    """
+
+    central: RoundTrip
+    embedded: RoundTrip
+    sample_time: float
+    embedded_period: float
+    delayed_torque_feedback: bool
+
+    def __init__(
+        self,
+        *,
+        central: RoundTrip | DelaySignal,
+        embedded: RoundTrip | DelaySignal,
+        sample_time: float = 0.0,
+        embedded_period: float = 0.0,
+        delayed_torque_feedback: bool = False,
+    ) -> None:
+        check_delay_s(sample_time, "The sample time")
+        check_delay_s(embedded_period, "The embedded period")
+        for name, value in (
+            ("central", _round_trip(central)),
+            ("embedded", _round_trip(embedded)),
+            ("sample_time", sample_time),
+            ("embedded_period", embedded_period),
+            ("delayed_torque_feedback", delayed_torque_feedback),
+        ):
+            object.__setattr__(self, name, value)
+        if embedded_period > sample_time > 0.0:
+            raise InputError(
+                f"The embedded period {embedded_period:g} s is longer than the central one, "
+                f"{sample_time:g} s."
+            )
+        _ = self.d_1
+
+    @property
+    def d_0(self) -> float:
+        """Upper bound of the same delay as d_1, s."""
+        return self.d_1
+
+    @property
+    def d_1(self) -> float:
+        """Upper bound of the position feedback's total delay, s."""
+        up = self.central.up.late_bound(self.embedded_period or self.sample_time)
+        return up + self.embedded_period + self.d_2
+
+    @property
+    def d_2(self) -> float:
+        """Upper bound of the feedforward path's delay, s."""
+        down = self.central.down.late_bound(self.sample_time)
+        drive = self.embedded.down.late_bound(self.embedded_period or self.sample_time)
+        return down + drive + self.sample_time + 2.0 * self.embedded_period
+
+    def d_1_at(self, t: float | Array) -> float | Array:
+        """Return the position feedback's total delay with its mean hold of half a period.
+
+        Jitter and losses are left out.
+
+        Args:
+            t: s.
+        """
+        return self.central.at(t) + self.embedded.down.delay.at(t) + 0.5 * self.sample_time
+
+    def d_2_at(self, t: float | Array) -> float | Array:
+        """Return the feedforward path's delay with its mean hold of half a period.
+
+        Jitter and losses are left out.
+
+        Args:
+            t: s.
+        """
+        down = self.central.down.delay.at(t) + self.embedded.down.delay.at(t)
+        return down + 0.5 * self.sample_time
+
+    def scaled(self, factor: float) -> "Delays":
+        """Return the same connections with all delays and jitters times a factor.
+
+        Args:
+            factor: at least 0; periods stay.
+
+        Raises:
+            InputError: the factor is negative or not finite.
+        """
+        return replace(
+            self, central=self.central.scaled(factor), embedded=self.embedded.scaled(factor)
+        )
+
+
+def _round_trip(signal: RoundTrip | DelaySignal) -> RoundTrip:
+    return signal if isinstance(signal, RoundTrip) else RoundTrip.halved(signal)
