@@ -46,7 +46,7 @@ def walk_section(
                     f"{walk.width_deviation:.0%} of {gait.step_width:g} m."
                 )
             ),
-            Raw(html=playback(robot, walk), caption="Drag to turn. Right leg blue, left leg red."),
+            Raw(html=playback(robot, walk), caption="Drag to turn. Right leg blue, left leg orange; a ring marks a foot on the ground."),
             Figure(
                 svg=plot_gait(walk),
                 caption="Apex speed (m/s) and step width (m) at each step; the plan is dashed, "
@@ -384,12 +384,16 @@ def playback(robot: Robot, walk: Walk) -> str:
                 "t": round(float(run.time[k]), 3),
                 "base": [round(float(v), 3) for v in base],
                 "head": [round(float(v), 3) for v in head],
+                "down": [
+                    int(run.contact_mode[k, list(run.feet).index(f"{side}_foot")] > 0)
+                    for side in ("left", "right")
+                ],
                 **{side: [[round(float(v), 3) for v in base], *leg] for side, leg in legs.items()},
             }
         )
     xs = np.arange(frames[0]["base"][0] - 1.2, frames[-1]["base"][0] + 1.4, 0.05)
     ground = [[round(float(x), 3), round(walk.case.terrain.height(x, 0.0), 3)] for x in xs]
-    data = {"rate": FRAMES_PER_SECOND, "ground": 0.0, "terrain": ground, "frames": frames}
+    data = {"rate": FRAMES_PER_SECOND, "terrain": ground, "frames": frames}
     environment = jinja2.Environment(loader=jinja2.PackageLoader("sealag.report"), autoescape=True)
     template = environment.get_template("playback.html")
     return template.render(data=Markup(json.dumps(data, separators=(",", ":"))))
