@@ -14,6 +14,7 @@ from sealag.typing import Array
 BETAS = (0.1, 0.5, 1.0, 2.0)
 DAMPING_SCALES = (0.3, 1.0)
 STIFFNESSES = (350.0, 1000.0)
+LAG_TOLERANCE = 4e-3  # s
 VISIBLE = 1.25  # ratio of RMS deviations from which the effect of β counts as visible
 
 
@@ -31,7 +32,9 @@ class TorqueTrace:
         achieved: (N, n) spring torque Γ_sea, Nm.
         deviation: (n,) RMS of their difference after the first step, Nm.
         raw_deviation: (n,) RMS of τ_osc − Γ_sea with the feedforward left in, Nm.
-        lag: measured delay of the acting command behind the sent one, s.
+        command_lag: measured delay of the acting command behind the sent one, s.
+        torque_lag: measured delay of Γ_sea behind the task torque when it was sent, s: the
+            channel's and that of springs and motors.
         channel: mean of (T_H + T_L) / 2 over the walk, s.
     """
 
@@ -43,7 +46,8 @@ class TorqueTrace:
     achieved: Array
     deviation: Array
     raw_deviation: Array
-    lag: float
+    command_lag: float
+    torque_lag: float
     channel: float
 
 
@@ -73,8 +77,8 @@ def _trace(project: str, stiffness: float, scale: float, beta: float) -> TorqueT
     walk = simulate_walk(system, case)
     run = walk.run
     late = run.time > (walk.touchdown[1] if len(walk.touchdown) > 1 else 0.0)
-    stamp = np.rint((run.time - run.command_age) / TICK).astype(int)
-    asked = walk.task[np.clip(stamp, 0, len(walk.task) - 1)]
+    asked = _task_torque(walk, run.time - run.command_age)
+    sent = _task_torque(walk, run.time)
     channel = 0.5 * (system.delays.central.at(run.time) + system.delays.embedded.at(run.time))
     return TorqueTrace(
         beta=beta,
@@ -85,9 +89,16 @@ def _trace(project: str, stiffness: float, scale: float, beta: float) -> TorqueT
         achieved=run.tau_sea,
         deviation=_rms((asked - run.tau_sea)[late]),
         raw_deviation=_rms((run.tau_osc - run.tau_sea)[late]),
-        lag=measured_lag(run.time[late], run.tau_command[late], run.tau_osc[late]),
+        command_lag=measured_lag(run.time[late], run.tau_command[late], run.tau_osc[late]),
+        torque_lag=measured_lag(run.time[late], sent[late], run.tau_sea[late]),
         channel=float(np.mean(channel)),
     )
+
+
+def _task_torque(walk: Walk, time: Array) -> Array:
+    """The task torque of the ticks at given instants (N, n)."""
+    tick = np.rint(time / TICK).astype(int)
+    return walk.task[np.clip(tick, 0, len(walk.task) - 1)]
 
 
 def _rms(values: Array) -> Array:
@@ -143,12 +154,8 @@ def figure_5_claims(traces: Sequence[TorqueTrace]) -> tuple[Claim, ...]:
     ]
     full = [t for t in traces if t.damping_scale == 1.0 and t.walk.walked]
     raw = np.array([t.raw_deviation.mean() for t in full])
-    lag = np.array([trace.lag for trace in full])
-    channel = float(np.mean([trace.channel for trace in full])) if full else float("nan")
-    near = bool(len(lag) and (np.abs(lag - channel) < 4e-3).all())
     soft = {(t.stiffness, t.beta): t for t in traces if t.damping_scale < 1.0 and t.walk.walked}
     pairs = [(t, soft[t.stiffness, t.beta]) for t in full if (t.stiffness, t.beta) in soft]
-    less = bool(pairs and all(a.raw_deviation.mean() > b.raw_deviation.mean() for a, b in pairs))
     return (
         Claim(
             key="beta",
@@ -170,32 +177,54 @@ def figure_5_claims(traces: Sequence[TorqueTrace]) -> tuple[Claim, ...]:
             tolerance="mean RMS rises with every step of β, for each K and α, on walks that do "
             "not fall",
         ),
-        Claim(
-            key="damping deviation",
-            source="Section V; conclusions",
-            published="A larger D_θ makes the spring torque deviate more from its command.",
-            computed=(
-                "RMS of τ_osc − Γ_sea at α = 0.3 and 1: "
-                + "; ".join(
-                    f"K = {a.stiffness:g}, β = {a.beta:g}: {b.raw_deviation.mean():.0f} and "
-                    f"{a.raw_deviation.mean():.0f} Nm"
-                    for a, b in pairs
-                )
-                + "."
-            ),
-            verdict=Verdict.CONFIRMED if less else Verdict.QUALIFIED,
-            tolerance="mean RMS larger at α = 1 for every K and β that walks at both",
+        _damping_claim(pairs),
+        _lag_claim(full),
+    )
+
+
+def _damping_claim(pairs: Sequence[tuple[TorqueTrace, TorqueTrace]]) -> Claim:
+    """Whether more damping means more deviation, from pairs of walks at α = 1 and 0.3."""
+    raw = [(a.raw_deviation.mean(), b.raw_deviation.mean()) for a, b in pairs]
+    task = [(a.deviation.mean(), b.deviation.mean()) for a, b in pairs]
+    each = "; ".join(
+        f"K = {a.stiffness:g}, β = {a.beta:g}: {x[1]:.0f} → {x[0]:.0f} and {y[1]:.1f} → {y[0]:.1f}"
+        for (a, _), x, y in zip(pairs, raw, task, strict=True)
+    )
+    more = bool(pairs) and all(x > y for x, y in [*raw, *task])
+    return Claim(
+        key="damping deviation",
+        source="Section V; conclusions",
+        published="A larger D_θ makes the spring torque deviate more from its command.",
+        computed=(
+            "RMS in Nm from α = 0.3 to 1 of τ_osc − Γ_sea, which holds D_θθ̇_d, and of the "
+            f"delayed task torque less Γ_sea: {each}."
         ),
-        Claim(
-            key="lag",
-            source="Section V, Fig. 5",
-            published="The achieved torque lags by the feedforward delay (T_H + T_L)/2.",
-            computed=(
-                "Acting behind sent command, by least squares over the walk: "
-                + ", ".join(f"{value * 1e3:.1f}" for value in lag)
-                + f" ms; mean (T_H + T_L)/2 is {channel * 1e3:.1f} ms, sampling adds up to 2 ms."
-            ),
-            verdict=Verdict.CONFIRMED if near else Verdict.QUALIFIED,
-            tolerance="within 4 ms of the mean channel delay",
+        verdict=Verdict.CONFIRMED if more else Verdict.QUALIFIED,
+        tolerance="both means larger at α = 1 for every K and β that walks at both",
+    )
+
+
+def _lag_claim(traces: Sequence[TorqueTrace]) -> Claim:
+    """Whether the achieved torque lags its command by the feedforward delay."""
+    command = 1e3 * np.array([trace.command_lag for trace in traces])
+    torque = 1e3 * np.array([trace.torque_lag for trace in traces])
+    channel = 1e3 * float(np.mean([trace.channel for trace in traces])) if traces else np.nan
+    near = bool(len(torque) and (np.abs(torque - channel) < LAG_TOLERANCE * 1e3).all())
+    each = "; ".join(
+        f"K = {trace.stiffness:g}, β = {trace.beta:g}: {value:.1f} ms"
+        for trace, value in zip(traces, torque, strict=True)
+    )
+    return Claim(
+        key="lag",
+        source="Section V, Fig. 5",
+        published="The achieved torque lags by the feedforward delay (T_H + T_L)/2.",
+        computed=(
+            f"By least squares over the walk at α = 1, Γ_sea behind Γ_osc as sent: {each}. The "
+            f"command alone arrives {command.min(initial=np.inf):.1f} to "
+            f"{command.max(initial=-np.inf):.1f} ms late, where the mean (T_H + T_L)/2 is "
+            f"{channel:.1f} ms and sampling adds up to 2 ms; the rest is the lag of springs and "
+            "motors, which grows with β."
         ),
+        verdict=Verdict.CONFIRMED if near else Verdict.QUALIFIED,
+        tolerance=f"Γ_sea within {LAG_TOLERANCE * 1e3:g} ms of the mean (T_H + T_L)/2",
     )

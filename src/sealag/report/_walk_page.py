@@ -46,7 +46,11 @@ def walk_section(
                     f"{walk.width_deviation:.0%} of {gait.step_width:g} m."
                 )
             ),
-            Raw(html=playback(robot, walk), caption="Drag to turn. Right leg blue, left leg orange; a ring marks a foot on the ground."),
+            Raw(
+                html=playback(robot, walk),
+                caption="Drag to turn. Right leg blue, left leg orange; a ring marks a foot on the "
+                "ground.",
+            ),
             Figure(
                 svg=plot_gait(walk),
                 caption="Apex speed (m/s) and step width (m) at each step; the plan is dashed, "
@@ -315,7 +319,8 @@ def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Se
             Cell(text=f"{t.beta:g}", css="number"),
             *(_if_walked(t, f"{value:.1f}") for value in t.deviation[:3]),
             _if_walked(t, f"{t.raw_deviation.mean():.0f}"),
-            _if_walked(t, f"{t.lag * 1e3:.1f}"),
+            _if_walked(t, f"{t.command_lag * 1e3:.1f}"),
+            _if_walked(t, f"{t.torque_lag * 1e3:.1f}"),
             t.walk.cause,
         ]
         for t in traces
@@ -340,12 +345,12 @@ def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Se
             Table(
                 columns=[
                     "K (Nm/rad)", "α", "β", *(f"{name} (Nm)" for name in joints[:3]),
-                    "τ_osc − Γ_sea (Nm)", "lag (ms)", "walk",
+                    "τ_osc − Γ_sea (Nm)", "command late (ms)", "Γ_sea late (ms)", "walk",
                 ],
                 rows=rows,
                 caption="RMS of Γ_osc − Γ_sea for one leg's joints; mean RMS over all joints with "
-                "the feedforward left in; measured lag of the acting command behind the sent one, "
-                f"beside a mean (T_H + T_L)/2 of {channel * 1e3:.1f} ms.",
+                "the feedforward left in; measured lags of the acting command and of Γ_sea behind "
+                f"what was sent, beside a mean (T_H + T_L)/2 of {channel * 1e3:.1f} ms.",
             ),
         ],
     )  # fmt: skip
