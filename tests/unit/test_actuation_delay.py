@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from sealag.actuation import actuators, deviation_rms, torque_transfer, transparency
-from sealag.delay import Constant, Delays, Sinusoid, Table, measured
+from sealag.delay import (
+    Constant,
+    Delays,
+    Link,
+    PacketOrder,
+    RoundTrip,
+    Sinusoid,
+    Table,
+    measured,
+)
 from sealag.errors import InputError
 
 SPRING = {"spring_stiffness": 350.0, "rotor_inertia": 0.09, "motor_damping": 10.0}
@@ -56,6 +65,36 @@ def test_sampling_adds_its_hold():
     sampled = Delays(central=Constant(0.01), embedded=Constant(0.0), sample_time=0.002)
     assert sampled.d_1 == pytest.approx(0.012)
     assert sampled.d_2 == pytest.approx(0.007)
+
+
+def test_ways_need_not_be_alike():
+    """d_1 is the sum around the loop, d_2 what lies between controller and motor."""
+    central = RoundTrip(up=Link(delay=Constant(0.002)), down=Link(delay=Constant(0.007)))
+    embedded = RoundTrip(up=Link(delay=Constant(0.5)), down=Link(delay=Constant(0.001)))
+    delays = Delays(central=central, embedded=embedded)
+    assert delays.d_1 == pytest.approx(0.010)
+    assert delays.d_2 == pytest.approx(0.008)
+    assert delays.d_1_at(0.3) == pytest.approx(0.010)
+    assert delays.central.mean == pytest.approx(0.009)
+    assert delays.scaled(2.0).d_1 == pytest.approx(0.020)
+
+
+def test_jitter_and_losses_count():
+    plain = {"central": Constant(0.01), "embedded": Constant(0.0), "sample_time": 0.002}
+    jitter = RoundTrip.halved(Constant(0.01), jitter=0.003)
+    assert Delays(**{**plain, "central": jitter}).d_1 == pytest.approx(0.012 + 2 * 0.003)
+    overtaken = RoundTrip.halved(Constant(0.01), jitter=0.003, order=PacketOrder.ARRIVAL)
+    assert Delays(**{**plain, "central": overtaken}).d_1 == pytest.approx(0.012 + 4 * 0.003)
+    lost = RoundTrip.halved(Constant(0.01), loss=0.1, max_burst=3)
+    assert Delays(**{**plain, "central": lost}).d_1 == pytest.approx(0.012 + 2 * 3 * 0.002)
+    looks = Delays(**plain, embedded_period=0.001)
+    assert looks.d_1 == pytest.approx(0.012 + 3 * 0.001)
+    with pytest.raises(InputError, match="period"):
+        Delays(central=lost, embedded=Constant(0.0))
+    with pytest.raises(InputError, match="embedded period"):
+        Delays(**plain, embedded_period=0.003)
+    with pytest.raises(InputError, match="share"):
+        looks.scaled(-1.0)
 
 
 def test_table_and_samples():
