@@ -42,10 +42,15 @@ kind = "posture"               # com | position | orientation | pose | posture
 stiffness = "FILL: 1/s^2, times the task inertia"
 priority = 1
 
+# Delays are constant, sinusoid (mean_ms, amplitude_ms, angular_frequency_rad_s), table (time_s,
+# delay_ms) or samples (file of measured ones in ms, period_s), each with jitter_ms, packet_loss,
+# max_burst and order ("fifo", "newest", "arrival") if packets are late or lost. Instead of a round
+# trip both of its ways may be given: central_up and central_down, embedded_up and embedded_down.
 [delays]
 central_round_trip = {{ kind = "constant", value_ms = "FILL: T_H, ms" }}
 embedded_round_trip = {{ kind = "constant", value_ms = "FILL: T_L, ms" }}
 sample_time_ms = 1.0           # period of the central controller; its hold is added
+# embedded_period_ms = 0.5     # at which the robot's side sends and looks; added for each link
 """
 
 
@@ -97,7 +102,7 @@ def _middle(robot: Robot, index: int) -> float:
 
 
 def _contacts(robot: Robot) -> str:
-    frames = [name for name in robot.frame_names() if name not in robot.joints]
+    frames = robot.link_names()
     feet = [name for name in frames if any(w in name.lower() for w in ("foot", "sole", "toe"))]
     lines = ["", "# Frames that the ground holds: a point (3 forces) or a surface (6)."]
     for name in feet[:4]:

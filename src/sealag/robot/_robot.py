@@ -254,6 +254,10 @@ class Robot:
         """Return the names of all frames: links and joints."""
         return tuple(frame.name for frame in self._model.frames)
 
+    def link_names(self) -> tuple[str, ...]:
+        """Return the names of the URDF's links, which are frames too."""
+        return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
+
     def check_frame(self, frame: str) -> str:
         """Return the name of a frame if it exists.
 
