@@ -80,11 +80,19 @@ def certify(
 
 
 @app.command()
-def margin(project: Project, motion: MotionFile = None, as_json: Json = False) -> None:
+def margin(
+    project: Project,
+    motion: MotionFile = None,
+    horizon_ms: Annotated[
+        float | None,
+        typer.Option("--horizon-ms", help="List stable and unstable delays up to this one."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """Compute the exact local delay margin of the frozen closed loop, along a motion."""
     from sealag.cli._commands import margin_project
 
-    margin_project(project, motion, as_json=as_json)
+    margin_project(project, motion, horizon_ms=horizon_ms, as_json=as_json)
 
 
 @app.command()

@@ -13,6 +13,7 @@ from sealag.errors import FileError, InputError
 from sealag.files import write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
+from sealag.units import seconds_from_ms
 
 
 def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
@@ -102,12 +103,15 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         print(f"assumes that {assumption}")
 
 
-def margin_project(project: str, motion: Path | None, *, as_json: bool) -> None:
+def margin_project(
+    project: str, motion: Path | None, *, horizon_ms: float | None, as_json: bool
+) -> None:
     """Show the exact local margin at every instant, or at a sample of a long motion."""
     from sealag.design import local_margins
 
     system = load(project)
-    found = local_margins(system, _motion(system, motion))
+    horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
+    found = local_margins(system, _motion(system, motion), horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)
@@ -120,6 +124,8 @@ def margin_project(project: str, motion: Path | None, *, as_json: bool) -> None:
     print(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
     mode = sorted(found.mode.items(), key=lambda item: -item[1])
     print(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
+    for low, high, count in found.intervals:
+        print(f"{_ms(low):>14} to {_ms(high):14} {count} unstable roots")
 
 
 def verify_certificate(path: Path, *, exact: bool, as_json: bool) -> int:

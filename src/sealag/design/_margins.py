@@ -8,7 +8,7 @@ import numpy as np
 
 from sealag.design._project import System
 from sealag.errors import ContractionError
-from sealag.margin import DelayMargin, delay_margin
+from sealag.margin import DelayMargin, Interval, delay_margin
 from sealag.robot import Motion
 from sealag.whole_body import Linearisation, evaluate, linearise
 
@@ -30,6 +30,8 @@ class LocalMargins:
         time_s: its time, s.
         instants: number of instants of the motion.
         evaluated: number of them that were evaluated, evenly spaced.
+        intervals: ranges of delay at that instant with their numbers of unstable roots, when a
+            horizon was given; else empty.
     """
 
     delay_s: float
@@ -42,16 +44,25 @@ class LocalMargins:
     time_s: float
     instants: int
     evaluated: int
+    intervals: tuple[Interval, ...]
 
     def summary(self) -> dict[str, Any]:
         """Return everything, with None for what is not finite: no delay is too long."""
-        return {
-            key: None if isinstance(value, float) and not np.isfinite(value) else value
-            for key, value in asdict(self).items()
-        }
+        plain = {key: _number(value) for key, value in asdict(self).items()}
+        plain["intervals"] = [
+            {"from_s": low, "to_s": _number(high), "unstable_roots": count}
+            for low, high, count in self.intervals
+        ]
+        return plain
 
 
-def local_margins(system: System, motion: Motion | None = None) -> LocalMargins:
+def _number(value: Any) -> Any:
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def local_margins(
+    system: System, motion: Motion | None = None, *, horizon: float | None = None
+) -> LocalMargins:
     """Compute the exact local margin of the law that is run, along a motion.
 
     Necessary and sufficient for local stability at constant delay with frozen coefficients.
@@ -60,8 +71,10 @@ def local_margins(system: System, motion: Motion | None = None) -> LocalMargins:
         system: the design.
         motion: the motion; the system's posture if None. Of long ones, 200 evenly spaced
             instants are evaluated.
+        horizon: longest delay up to which the ranges of stable and unstable delay are listed, s.
 
     Raises:
+        InputError: the horizon is not a positive time.
         ContractionError: q̄(θ) is fed back and has no contraction.
     """
     motion = system.still() if motion is None else motion
@@ -99,6 +112,8 @@ def local_margins(system: System, motion: Motion | None = None) -> LocalMargins:
         found.append((delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries), frozen))
     at = min(range(len(found)), key=lambda k: (found[k][0].delay, found[k][0].first_crossing))
     margin, frozen = found[at]
+    if horizon is not None:
+        margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries, horizon=horizon)
     n, k = system.robot.n, frozen.Z.shape[1]
     size = np.abs(margin.mode[k : k + n]) if len(margin.mode) else np.zeros(n)
     shares = size / max(float(size.sum()), 1e-300)
@@ -113,4 +128,5 @@ def local_margins(system: System, motion: Motion | None = None) -> LocalMargins:
         time_s=float(part.time[at]),
         instants=len(motion),
         evaluated=len(part),
+        intervals=margin.intervals,
     )

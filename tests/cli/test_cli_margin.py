@@ -1,0 +1,56 @@
+"""`sealag margin`: the exact margin, and stable and unstable delays beyond it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sealag
+from sealag.cli import main
+from sealag.margin import rightmost_roots
+from sealag.whole_body import evaluate, linearise
+
+BAXTER = Path(__file__).resolve().parents[2] / "examples/baxter.toml"
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(["margin", *(str(argument) for argument in arguments)])
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+def test_intervals_agree_with_counted_roots(capsys):
+    code, text, err = run(capsys, BAXTER, "--horizon-ms", "150", "--json")
+    answer = json.loads(text)
+    assert (code, err) == (0, "")
+    ranges = answer["intervals"]
+    assert ranges[0]["to_s"] == pytest.approx(answer["delay_s"])
+    assert ranges[-1]["to_s"] == pytest.approx(0.15)
+    assert [a["to_s"] for a in ranges[:-1]] == [b["from_s"] for b in ranges[1:]]
+    system = sealag.load(BAXTER)
+    motion = system.still()
+    stack = evaluate(
+        system.robot, system.hierarchy, system.actuators, motion=motion,
+        feedback=system.feedback, gravity=system.gravity,
+    )  # fmt: skip
+    frozen = linearise(
+        system.robot, system.actuators, motion.q[0], contacts=(), F=stack.F_theta[0],
+        feedback=system.feedback,
+    )  # fmt: skip
+    for part in ranges:
+        middle = 0.5 * (part["from_s"] + part["to_s"])
+        roots = rightmost_roots(frozen.A_0, frozen.A_1, middle, count=12)
+        assert (roots.real > 0).sum() == part["unstable_roots"]
+    assert np.unique([part["unstable_roots"] for part in ranges]).size > 1
+
+
+def test_ranges_are_listed_in_words(capsys):
+    code, text, _ = run(capsys, BAXTER, "--horizon-ms", "150")
+    assert code == 0
+    assert "0 unstable roots" in text
+    assert "4 unstable roots" in text
+    code, text, err = run(capsys, BAXTER, "--horizon-ms", "0")
+    assert (code, text) == (2, "")
+    assert "horizon" in err
