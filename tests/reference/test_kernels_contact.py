@@ -39,6 +39,27 @@ class TestManifold:
             np.testing.assert_allclose(J @ out, v, atol=tolerance)
 
 
+def test_frames_are_pinocchio_s(hume):
+    """Jacobian, place and J̇ v of every frame, from the joints' terms alone."""
+    rng = np.random.default_rng(2)
+    q, v = (
+        pin.randomConfiguration(hume._model, np.full(13, -1.0), np.full(13, 1.0)),
+        rng.normal(size=12),
+    )
+    names, at = hume.frame_names(), hume.workspace()
+    at.update(q, v)
+    count = len(names)
+    J, R, p, bias = (np.full((count, *s), np.nan) for s in ((6, 12), (3, 3), (3,), (6,)))
+    rigid.frames(at.terms, hume.frame_mounts(names), J, R, p, bias)
+    for f, name in enumerate(names):
+        rotation, position = at.frame_placement(name)
+        for got, wanted in (
+            (J[f], at.frame_jacobian(name)), (R[f], rotation), (p[f], position),
+            (bias[f], at.frame_bias(name)),
+        ):  # fmt: skip
+            np.testing.assert_allclose(got, wanted, atol=1e-13)
+
+
 def _instant(hume, q, v):
     """All terms of an instant: mass matrix, bias, and point Jacobians of both feet."""
     workspace = hume.workspace()
@@ -53,7 +74,7 @@ def _solve(M, right, J, C, target, closed, mu):
     nv, count = len(M), len(closed)
     L, rows = np.zeros((nv, nv)), np.zeros((count, 3, nv))
     assert rigid.cholesky(M, L)
-    contact.project(L, J, C, rows)
+    contact.project(L, J, C, closed, rows)
     free = np.linalg.solve(L, right)
     x, force, yielding = np.zeros(nv), np.zeros((count, 3)), np.zeros(count)
     none, foot_of = np.zeros((0, 2)), np.zeros(count, np.int64)
@@ -149,7 +170,7 @@ def test_settle_opens_what_pulls():
     J[:, 2] = [[1.0, -0.5], [1.0, 0.5]]
     L, rows = np.zeros((2, 2)), np.zeros((2, 3, 2))
     rigid.cholesky(M, L)
-    contact.project(L, J, np.tile(np.eye(3), (2, 1, 1)), rows)
+    contact.project(L, J, np.tile(np.eye(3), (2, 1, 1)), np.ones(2, np.int64), rows)
     free = np.linalg.solve(L, np.array([-9.81, 20.0]))
     closed, mask = np.ones(2, np.int64), np.ones(2, np.int64)
     x, force = np.zeros(2), np.zeros((2, 3))

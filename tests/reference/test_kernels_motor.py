@@ -64,7 +64,7 @@ def _move(p, z, tau, step, regular, instant=1.0, measured=0.0):
     forms, work = np.empty((n, 4, 5, 9, 9)), np.zeros((n, 7))
     motor.tables(p, instant, step, half, whole, forms)
     tau, measured = np.full(n, tau), np.full(n, measured)
-    motor.move(p, instant, tau, measured, z, step, whole, forms, regular, work)
+    motor.move(p, instant, tau, measured, z, step, whole, forms, regular, True, work)
     return z, work
 
 

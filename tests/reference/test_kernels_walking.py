@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from sealag.kernels import walking
+from sealag.kernels import walking, walking_law, walking_state
+from sealag.robot import load_robot
 
 NV, N = 12, 6
 
@@ -62,28 +63,45 @@ def test_pendulum_against_an_adaptive_integrator():
     np.testing.assert_allclose(np.concatenate(fine), exact, atol=1e-5)
 
 
+def _constrain(M, h, J, b):
+    a_0, P = np.full(NV, np.nan), np.full((NV, N), np.nan)
+    walking_law.constrain(np.linalg.inv(M), h, J, b, a_0, P)
+    return a_0, P
+
+
 def test_constrained_accelerations_solve_the_saddle_point(terms):
-    """v̇ = a_0 + P τ equals the solution with contact forces written out."""
+    """v̇ = a_0 + P τ equals the solution with contact forces written out; one foot and both."""
     M, h, J, b, rng = terms
     tau = rng.standard_normal(N)
-    a_0, P = walking.constrain(np.linalg.inv(M), h, J[0], b[0], N)
-    full = np.block([[M, -J[0].T], [J[0], np.zeros((3, 3))]])
-    right = np.concatenate([-h, -b[0]])
-    right[NV - N : NV] += tau
-    np.testing.assert_allclose(a_0 + P @ tau, np.linalg.solve(full, right)[:NV], atol=1e-10)
+    for feet in (1, 2):
+        rows, bias = J[:feet].reshape(3 * feet, NV), b[:feet].ravel()
+        full = np.block([[M, -rows.T], [rows, np.zeros((3 * feet, 3 * feet))]])
+        right = np.concatenate([-h, -bias])
+        right[NV - N : NV] += tau
+        a_0, P = _constrain(M, h, rows, bias)
+        np.testing.assert_allclose(a_0 + P @ tau, np.linalg.solve(full, right)[:NV], atol=1e-10)
 
 
 def test_task_torques_give_the_accelerations_wanted(terms):
     """J_t v̇ + J̇_t v is what was asked for; near a singularity the torque stays bounded."""
     M, h, J, b, rng = terms
     J_t, b_t, wanted = rng.standard_normal((N, NV)), rng.standard_normal(N), rng.standard_normal(N)
-    a_0, P = walking.constrain(np.linalg.inv(M), h, J[0], b[0], N)
-    tau, a = walking.task_torques(a_0, P, J_t, b_t, wanted, 1e-14)
-    np.testing.assert_allclose(J_t @ a + b_t, wanted, atol=1e-8)
-    np.testing.assert_allclose(a, a_0 + P @ tau)
+    a_0, P = _constrain(M, h, J[0], b[0])
+    tau = np.full(N, np.nan)
+    walking_law.task_torques(a_0, P, J_t, b_t, wanted, 1e-14, tau)
+    np.testing.assert_allclose(J_t @ (a_0 + P @ tau) + b_t, wanted, atol=1e-8)
     J_t[5] = J_t[4]
-    tau, _ = walking.task_torques(a_0, P, J_t, b_t, wanted, 1e-6)
+    walking_law.task_torques(a_0, P, J_t, b_t, wanted, 1e-6, tau)
     assert np.abs(tau).max() < 1e5
+
+
+def test_damped_solve_against_its_plain_twin(terms):
+    """(AᵀA + δ trace(AᵀA)) x = Aᵀ r."""
+    A, r = terms[0], terms[4].standard_normal(NV)
+    x, G = np.full(NV, np.nan), A.T @ A
+    walking_law.damped_solve(A, r, 1e-3, x)
+    plain = np.linalg.solve(G + 1e-3 * np.trace(G) * np.eye(NV), A.T @ r)
+    np.testing.assert_allclose(x, plain, rtol=1e-10)
 
 
 def plain_predict(M, h, J, b, q, v, motor, K, table, *, start, period, ticks, sent, begin, end):
@@ -128,8 +146,158 @@ def test_prediction_against_its_plain_twin(terms, begin, end):
         begin=begin, end=end,
     )  # fmt: skip
     speed, drive = v.copy(), motor.copy()
-    moved = walking.predict(
+    moved = walking_state.predict(
         M, h, J, b, q, speed, drive, K, table, 0.0, 1e-3, 15, arrival, command, 10 % 8, begin, end
     )
     for got, wanted in zip((moved, speed, drive), expected, strict=True):
         np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_foothold_against_its_plain_twin(side):
+    """The averaged end of the step; ξ(T) = u + ξ_plan solved for u, within reach."""
+    height = np.array([0.88, 0.1, 0.0, 0.0, 0.0, 0.0])
+    old, new, com = np.array([-0.2, 0.2, 0.0]), np.zeros(3), np.array([-0.05, 0.1, 0.9])
+    speed, momentum = np.array([0.5, -0.1, 0.0]), np.array([0.02, -0.01])
+    gait = np.array([0.35, 0.06, 3.4, 3.3, 1.4, 0.2, 0.1, -0.15, 0.55, 0.12, 0.5, side])
+    memory = np.array([[0.1, 0.05], [0.6, 0.2]])
+    x, v = com[:2].copy(), speed[:2] + momentum
+    walking.pendulum(x, v, 0.1, 0.35, 0.06, old, new, height, 0.02, 16)
+    end = memory + 0.3 * (np.array([x, v]) - memory)
+    u = (3.3 * (end[0] + end[1] / 3.4) - [0.2, -side * 0.1]) / (3.3 - 1.4)
+    place = walking.capture_end(
+        com, speed, momentum, old, new, height, 0.02, 0.1, gait, 0.3, memory
+    )
+    np.testing.assert_allclose(memory, end)
+    np.testing.assert_allclose(
+        place, [np.clip(u[0], -0.15, 0.55), side * np.clip(side * u[1], 0.12, 0.5)]
+    )
+
+
+def test_swing_moves_along_the_quintics_and_lands():
+    """From rest to rest at the target, clear of the ground, derivatives by differences."""
+    gait, target = np.array([0.35, 0.06, 0.93, 0.3]), np.array([0.4, -0.1, 0.03])
+    now, rows = np.zeros((3, 3)), []
+    for i in range(60, 351):
+        walking.swing(now, target, i * 1e-3, 1e-3, gait, 0.0, 0.08)
+        rows.append(now.copy())
+    path = np.array(rows)
+    np.testing.assert_allclose(path[-2, 0], target, atol=1e-3)
+    assert path[:, 0, 2].max() > 0.08
+    rate = (path[2:, 0] - path[:-2, 0]) / 2e-3
+    np.testing.assert_allclose(rate[:250], path[1:-1, 1][:250], atol=0.02)
+    np.testing.assert_allclose(path[-1, 1], [0.0, 0.0, -0.3])
+
+
+@pytest.fixture(scope="module")
+def hume():
+    """Robot, its feet's mounts, and a workspace at a random state."""
+    robot, rng = load_robot("bundled:hume.urdf", floating_base=True), np.random.default_rng(7)
+    q = robot.configuration(
+        np.deg2rad([3, -25, 55, -2, -35, 60]), base_position=rng.normal(size=3),
+        base_quaternion=[0.02, 0.05, 0.3, 1.0],
+    )  # fmt: skip
+    v, at = 0.5 * rng.normal(size=NV), robot.workspace()
+    at.update(q, v)
+    return robot, q, v, at
+
+
+FEET = ("left_foot", "right_foot")
+
+
+@pytest.mark.parametrize("foot", [0, 1])
+def test_odometry_is_an_evaluation_at_the_corrected_state(hume, foot):
+    """The boosted terms are those that Pinocchio finds at the corrected place and velocity."""
+    robot, q, v, at = hume
+    J, b, h, anchor = np.zeros((2, 6, NV)), np.zeros((2, 3)), np.zeros(NV), np.ones((2, 3))
+    there, rate = q.copy(), v.copy()
+    walking_state.stand(at.terms, robot.frame_mounts(FEET), there, rate, h, foot, anchor, J, b)
+    plain = robot.workspace()
+    plain.update(there, rate)
+    np.testing.assert_allclose(plain.frame_placement(FEET[foot])[1], anchor[foot], atol=1e-12)
+    np.testing.assert_allclose(plain.frame_velocity(FEET[foot])[:3], 0.0, atol=1e-12)
+    np.testing.assert_allclose(there[3:], q[3:])
+    np.testing.assert_allclose(rate[3:], v[3:])
+    np.testing.assert_allclose(h, plain.nle, atol=1e-11)
+    for f, name in enumerate(FEET):
+        np.testing.assert_allclose(J[f], plain.frame_jacobian(name), atol=1e-13)
+        np.testing.assert_allclose(b[f], plain.frame_bias(name)[:3], atol=1e-12)
+
+
+def test_extrapolation_and_springs(hume):
+    """Without commands in flight v is extrapolated; the springs follow from motors and links."""
+    robot, q, v, at = hume
+    there, rate, tau, K = q.copy(), v.copy(), np.zeros(N), np.full(N, 350.0)
+    motor, ring = np.column_stack([q[-N:] + 0.1, v[-N:]]), (np.zeros(4), np.zeros((4, N)))
+    walking_state.foresee(
+        at.terms, robot.frame_mounts(FEET), there, rate, motor, 0, -1, np.zeros((2, 3)), K,
+        np.zeros((N, 2, 4)), (0.0, 1e-3, 0.0, 0.0), -20, ring, 0, tau,
+    )  # fmt: skip
+    expected = robot.integrate(q, 0.02 * v)
+    np.testing.assert_allclose(there, expected, atol=1e-12)
+    np.testing.assert_allclose(tau, 350.0 * (motor[:, 0] - expected[-N:]))
+
+
+@pytest.mark.parametrize("phase", [0.02, 0.2])
+def test_law_against_its_plain_twin(hume, phase):
+    """Task accelerations of one foot, or the blend of both feet's; planned joint rates."""
+    robot, _, v, at = hume
+    rng = np.random.default_rng(8)
+    height, swing = np.array([0.9, 0.1, 0.2, 0.0, 0.0, 0.0]), rng.normal(size=(3, 3))
+    gains = np.array([100.0, 110.0, 400.0, 10.0, 11.0, 20.0, 0.8, 10.0, 1e-14])
+    tau, rates, transfer = np.zeros(N), np.zeros(N), 0.06
+    com = at.com, at.com_velocity, at.com_bias(), at.com_jacobian()
+    assert walking_law.law(
+        at.terms, robot.frame_mounts(FEET), com, v, at.nle, False, height, swing, phase,
+        (transfer, 0.1), 0, gains, tau, rates,
+    )  # fmt: skip
+    z = 0.9 + 0.01 + 0.002, 0.1 + 0.04, 0.4
+    R = at.terms[3][1]
+    yaw = np.arctan2(R[1, 0], R[0, 0])
+    heading = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+    spin = np.zeros((3, NV))
+    spin[:, 3:6] = R
+    roll, pitch = np.arctan2(R[2, 1], R[2, 2]), np.arcsin(-R[2, 0])
+    J = [at.frame_jacobian(f)[:3] for f in FEET]
+    b = [at.frame_bias(f)[:3] for f in FEET]
+    error, slip = swing[0] - at.frame_placement(FEET[1])[1], swing[1] - J[1] @ v
+    wanted = np.zeros(N)
+    wanted[0] = 0.8 * z[2] + 100 * (z[0] - at.com[2]) + 10 * (z[1] - at.com_velocity[2])
+    wanted[1:3] = -110 * np.array([roll, pitch]) - 11 * (heading @ spin @ v)
+    if phase > transfer:
+        wanted[3:] = 0.8 * swing[2] + 400 * error + 20 * slip
+
+    def support(stance):
+        rows = np.vstack([com[3][2], heading @ spin, J[1 - stance]])
+        full = np.block([[at.M, -J[stance].T], [J[stance], np.zeros((3, 3))]])
+        X = np.linalg.solve(full, np.vstack([np.eye(NV)[:, -N:], np.zeros((3, N))]))[:NV]
+        free = np.linalg.solve(full, np.concatenate([-at.nle, -b[stance]]))[:NV]
+        drift = np.concatenate([com[2][2:], np.zeros(2), b[1 - stance]])
+        return np.linalg.solve(rows @ X, wanted - drift - rows @ free)
+
+    share = min(phase / transfer, 1.0)
+    plain = share * support(0) + (1 - share) * support(1)
+    np.testing.assert_allclose(tau, plain, rtol=1e-5, atol=1e-4)
+    rows = np.vstack([J[0], com[3][2], heading @ spin, J[1], com[3][:2], spin[2]])
+    speed = np.zeros(12)
+    speed[3], speed[9:11], speed[11] = z[1], com[1][:2], spin[2] @ v
+    if phase > transfer:
+        speed[6:9] = swing[1] + 10.0 * error
+    np.testing.assert_allclose(rates, np.linalg.solve(rows, speed)[6:], rtol=1e-4, atol=1e-5)
+
+
+def test_command_against_its_plain_twin():
+    """Limits, lead, velocity feedforward and torque feedback, each as it is written."""
+    rng = np.random.default_rng(9)
+    tau, smooth, rates, sea, D, ratio = rng.normal(size=(6, N))
+    limit, command = np.full(N, 0.8), np.zeros(N)
+    clipped = np.clip(tau, -0.8, 0.8)
+    average = clipped + 0.7 * (smooth - clipped)
+    plain = average + ratio * (clipped - average) / 5e-3 + D * rates + 0.5 * (clipped - sea)
+    gains = np.array([0.7, 5e-3, 1.0, 0.5])
+    walking_law.carry(tau, limit, smooth, rates, sea, D, ratio, gains, command)
+    np.testing.assert_allclose(command, plain)
+    np.testing.assert_allclose(smooth, average)
+    gains[1:] = 0.0
+    walking_law.carry(tau, limit, smooth, rates, sea, D, ratio, gains, command)
+    np.testing.assert_allclose(command, clipped)

@@ -7,7 +7,67 @@ import numpy as np
 from numba import njit
 
 from sealag.kernels.friction import solve, twist_torque
-from sealag.kernels.rigid import cholesky, forward_solve
+from sealag.kernels.rigid import cholesky, empty_terms, forward_solve, frames
+
+
+@njit(cache=True)
+def memory_size(sizes):
+    """Return how many numbers `parts` divides."""
+    nq, nv, n, count, total, feet, mounted = sizes
+    state = nq + 2 * nv + 10 * n + 4 * count + 3 * total + 5
+    work = nv + nv * nv + 3 * count * (nv + 1) + total * (3 * nv + 6) + feet * (nv + 1)
+    return state + work + mounted * (6 * nv + 18)
+
+
+@njit(cache=True)
+def motion(data, sizes):
+    """Return the first `parts` of an instant's memory: q, v, z (n, 9), acceleration, power (5,)."""
+    nq, nv, n = sizes[0], sizes[1], sizes[2]
+    first, last = nq + nv, nq + nv + 9 * n
+    return (
+        data[:nq], data[nq:first], data[first:last].reshape(n, 9), data[last : last + nv],
+        data[last + nv : last + nv + 5],
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def parts(data, sizes):
+    """Return the named parts of one instant's memory, in the order of `memory_size`.
+
+    Args:
+        data: (memory_size,).
+        sizes: nq, nv, n, contact points P, contact and loaded points T, feet, frames F.
+
+    Returns:
+        q, v, z (n, 9), acceleration (nv,), power (5,), tau (n,), force (P, 3), gap (P,),
+        position (T, 3), velocity, drift (T, 3), J (T, 3, nv), target (P, 3), rows (P, 3, nv),
+        right (nv,), L (nv, nv), twist_rows (feet, nv), spin (feet,), and of the frames J, R, p and
+        bias as in `rigid.frames`.
+    """
+    nq, nv, n, count, total, feet, mounted = sizes
+    q, v, z, acceleration, power = motion(data, sizes)
+    data = data[nq + 2 * nv + 9 * n + 5 :]
+    tau, data = data[:n], data[n:]
+    force, data = data[: 3 * count].reshape(count, 3), data[3 * count :]
+    gap, data = data[:count], data[count:]
+    position, data = data[: 3 * total].reshape(total, 3), data[3 * total :]
+    velocity, data = data[: 3 * total].reshape(total, 3), data[3 * total :]
+    drift, data = data[: 3 * total].reshape(total, 3), data[3 * total :]
+    J, data = data[: 3 * total * nv].reshape(total, 3, nv), data[3 * total * nv :]
+    target, data = data[: 3 * count].reshape(count, 3), data[3 * count :]
+    rows, data = data[: 3 * count * nv].reshape(count, 3, nv), data[3 * count * nv :]
+    right, data = data[:nv], data[nv:]
+    L, data = data[: nv * nv].reshape(nv, nv), data[nv * nv :]
+    twist_rows, data = data[: feet * nv].reshape(feet, nv), data[feet * nv :]
+    spin, data = data[:feet], data[feet:]
+    mounted_J, data = data[: 6 * mounted * nv].reshape(mounted, 6, nv), data[6 * mounted * nv :]
+    R, data = data[: 9 * mounted].reshape(mounted, 3, 3), data[9 * mounted :]
+    p, data = data[: 3 * mounted].reshape(mounted, 3), data[3 * mounted :]
+    bias = data.reshape(mounted, 6)
+    return (
+        q, v, z, acceleration, power, tau, force, gap, position, velocity, drift, J, target, rows,
+        right, L, twist_rows, spin, mounted_J, R, p, bias,
+    )  # fmt: skip
 
 
 @njit(cache=True)
@@ -71,10 +131,12 @@ def demand(C, position, anchor, velocity, drift, gain, stop_time, out):
 
 
 @njit(cache=True)
-def project(L, J, C, rows):
-    """Write L⁻¹ (C J)ᵀ of every point, as rows (P, 3, nv)."""
+def project(L, J, C, wanted, rows):
+    """Write L⁻¹ (C J)ᵀ of every wanted (P,) point, as rows (P, 3, nv)."""
     nv = L.shape[0]
     for i in range(C.shape[0]):
+        if wanted[i] == 0:
+            continue
         for a in range(3):
             for c in range(nv):
                 rows[i, a, c] = (
@@ -84,13 +146,16 @@ def project(L, J, C, rows):
 
 
 @njit(cache=True)
-def twist(L, J_frame, v, C, foot_of, rows, spin):
-    """Write L⁻¹ Jᵀ of every foot's turn about its normal (F, nv) and its rate (F,), rad/s."""
+def twist(L, J_frame, v, C, foot_of, torsion, rows, spin):
+    """Write L⁻¹ Jᵀ of every foot's turn about its normal (F, nv) and its rate (F,), rad/s.
+
+    Feet without torsional damping, the first column of ``torsion``, are left out.
+    """
     spin[:] = 0.0
     last = -1
     for i in range(foot_of.size):
         f = foot_of[i]
-        if f == last:
+        if f == last or torsion[f, 0] == 0.0:
             continue
         last = f
         for c in range(v.size):
@@ -103,19 +168,23 @@ def twist(L, J_frame, v, C, foot_of, rows, spin):
 
 
 @njit(cache=True)
-def margins(C, velocity, force, gap, closed, weight, out):
-    """Write for every point how far its ending condition is from happening (P,).
+def smallest_margin(C, velocity, force, gap, closed, weight):
+    """Return the smallest margin and its point: how far it is from ending its condition.
 
     Open: the gap (m), inf if it widens. Closed: the normal force in body weights.
     """
+    smallest, point = np.inf, 0
     for i in range(closed.size):
         if closed[i]:
-            out[i] = force[i, 2] / weight
-            continue
-        rate = 0.0
-        for b in range(3):
-            rate += C[i, 2, b] * velocity[i, b]
-        out[i] = gap[i] if rate < 0.0 else np.inf
+            margin = force[i, 2] / weight
+        else:
+            rate = 0.0
+            for b in range(3):
+                rate += C[i, 2, b] * velocity[i, b]
+            margin = gap[i] if rate < 0.0 else np.inf
+        if not margin >= smallest:
+            smallest, point = margin, i
+    return smallest, point
 
 
 @njit(cache=True)
@@ -141,14 +210,14 @@ def _kinetic(M, v):
 
 
 @njit(cache=True)
-def _apply(nle, joint, motor, spring, v, load, J, velocity, tau, right):
+def _apply(nle, joint, parameters, z, v, load, J, velocity, tau, right):
     """Write spring torques and all applied generalised forces; return the power of the loads."""
     nv, n = v.size, joint.size
     for i in range(nv):
         right[i] = -nle[i]
     for i in range(n):
-        tau[i] = spring[0][i] * (motor[i, 0] - joint[i])
-        tau[i] += spring[1][i] * (motor[i, 1] - v[nv - n + i])
+        tau[i] = parameters[i, 0] * (z[i, 0] - joint[i])
+        tau[i] += parameters[i, 1] * (z[i, 1] - v[nv - n + i])
         right[nv - n + i] += tau[i]
     power = 0.0
     for k in range(load.shape[0]):
@@ -161,69 +230,89 @@ def _apply(nle, joint, motor, spring, v, load, J, velocity, tau, right):
 
 
 @njit(cache=True)
-def evaluate(
-    M, nle, frames, v, joint, motor, spring, shape, ground, rates, state, load, torsion, instant
-):
+def evaluate(terms, around, state, rates, parameters, data, sizes):
     """Spring torque, applied forces, contact forces and acceleration at one instant.
 
-    Groups of arrays, all preallocated: ``frames`` (J, R, p, drift) of the feet and loaded frames,
-    ``joint`` link positions (n,), ``motor`` (n, 2 or more) angle and speed, ``spring`` (K, D_s),
-    ``shape`` (frame_of, offset), ``ground`` (C, anchor, mu, ridge), ``rates`` (stabilisation
-    gain, stop time), ``state`` (closed, yielding), ``load`` forces (L, 3) on the points after the
-    contact points, ``torsion`` as in ``solve``. Writes ``instant``: tau, acceleration, force,
-    position, velocity, target, right, L, rows, power, J, drift, twist_rows, spin; power: normal,
-    tangential, torsional, load, and kinetic energy. Returns False if there is no solution.
+    Args:
+        terms: the robot's terms at the instant, as `sealag.robot.Workspace.terms`.
+        around: what surrounds the robot: mounts of the feet's and loaded frames as
+            `sealag.robot.Robot.frame_mounts` gives them (4 arrays), frame (T,) and offset (T, 3)
+            of every point, C (P, 3, 3), anchor (P, 3), mu and ridge (P,), torsion (feet, 2) as in
+            ``friction.solve``, load (T - P, 3) N.
+        state: closed and yielding (P,).
+        rates: stabilisation rate 1/s, time in which friction may stop a point s.
+        parameters: of the actuators, as in ``motor``.
+        data: the instant's memory; q, v and the first two columns of z are read, the rest is
+            written. Powers: normal, tangential, torsional, load; then kinetic energy.
+        sizes: as in `parts`.
+
+    Returns:
+        False if there is no solution.
     """
-    J_frame, R, p, drift_frame = frames
-    frame_of, offset = shape
-    C, anchor, mu, ridge = ground
+    (
+        q, v, z, acceleration, power, tau, force, _, position, velocity, drift, J, target, rows,
+        right, L, twist_rows, spin, mounted_J, R, p, bias,
+    ) = parts(data, sizes)  # fmt: skip
+    frame_of, offset, C, anchor, mu, ridge, torsion, load = around[4:]
     closed, yielding = state
-    tau, acceleration, force, position, velocity, target, right, L, rows = instant[:9]
-    power, J, drift, twist_rows, spin = instant[9:]
-    points(J_frame, R, p, drift_frame, v, frame_of, offset, J, position, velocity, drift)
-    count = closed.size
-    power[3] = _apply(nle, joint, motor, spring, v, load, J[count:], velocity[count:], tau, right)
-    demand(C, position, anchor, velocity, drift, rates[0], rates[1], target)
+    M, count = terms[0], closed.size
+    foot_of, joint = frame_of[:count], q[q.size - tau.size :]
+    frames(terms, around[:4], mounted_J, R, p, bias)
+    points(mounted_J, R, p, bias, v, frame_of, offset, J, position, velocity, drift)
+    power[3] = _apply(
+        terms[1], joint, parameters, z, v, load, J[count:], velocity[count:], tau, right
+    )
     power[4] = _kinetic(M, v)
+    demand(C, position, anchor, velocity, drift, rates[0], rates[1], target)
     if not cholesky(M, L):
         return False
-    project(L, J, C, rows)
-    twist(L, J_frame, v, C, frame_of[:count], twist_rows, spin)
+    project(L, J, C, closed, rows)
+    twist(L, mounted_J, v, C, foot_of, torsion, twist_rows, spin)
     free = right.copy()
     forward_solve(L, free)
     solved = solve(
-        L, rows, free, target, closed, mu, ridge, yielding, frame_of[:count], torsion, twist_rows,
-        spin, acceleration, force,
+        L, rows, free, target, closed, mu, ridge, yielding, foot_of, torsion, twist_rows, spin,
+        acceleration, force,
     )  # fmt: skip
     _contact_power(C, velocity, force, closed, power)
-    torque = np.zeros(spin.size)
-    twist_torque(force, closed, frame_of[:count], torsion, spin, torque)
-    power[2] = 0.0
-    for f in range(spin.size):
-        power[2] += torque[f] * spin[f]
+    power[2] = _torsion_power(force, closed, foot_of, torsion, spin)
     return solved
+
+
+@njit(cache=True)
+def _torsion_power(force, closed, foot_of, torsion, spin):
+    torque = np.zeros(spin.size)
+    twist_torque(force, closed, foot_of, torsion, spin, torque)
+    power = 0.0
+    for f in range(spin.size):
+        power += torque[f] * spin[f]
+    return power
+
+
+def example():
+    """Return arguments of `evaluate` with the types used in practice: one foot, one joint."""
+    nv, count = 7, 1
+    sizes = (8, nv, 1, count, count, 1, 1)
+    mounts = (np.ones(1, np.int64), np.eye(3)[None], np.zeros((1, 3)), np.ones((1, nv), np.int64))
+    ground = (np.eye(3)[None], np.zeros((1, 3)), np.ones(1), np.zeros(1))
+    around = (
+        *mounts, np.zeros(1, np.int64), np.zeros((1, 3)), *ground, np.zeros((1, 2)),
+        np.zeros((0, 3)),
+    )  # fmt: skip
+    terms = empty_terms(nv, 3)
+    terms[2][:6, :6] = np.eye(6)
+    parameters = np.array([[350.0, 0.0, 0.1, 2.0, 10.0, 0.0, 0.1, np.inf, np.inf, np.inf]])
+    state, data = (np.ones(1, np.int64), np.zeros(1)), np.zeros(memory_size(sizes))
+    data[6] = 1.0
+    return terms, around, state, (50.0, 1e-3), parameters, data, sizes
 
 
 def warm() -> None:
     """Compile every kernel with the types used in practice."""
-    nv, M, none = 7, np.eye(7), np.zeros(0)
-    frames = (np.zeros((1, 6, nv)), np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, 6)))
-    frames[0][0, :6, :6] = np.eye(6)
-    shape = (np.zeros(1, np.int64), np.zeros((1, 3)))
-    ground = (np.eye(3)[None], np.zeros((1, 3)), np.ones(1), np.zeros(1))
-    state, rates = (np.ones(1, np.int64), np.zeros(1)), (50.0, 1e-3)
-    torsion, one = np.zeros((1, 2)), np.zeros((1, 3))
-    instant = (
-        np.zeros(1), np.zeros(nv), one, one.copy(), one.copy(), one.copy(), np.zeros(nv),
-        np.zeros((nv, nv)), np.zeros((1, 3, nv)), np.zeros(5), np.zeros((1, 3, nv)), one.copy(),
-        np.zeros((1, nv)), np.zeros(1),
-    )  # fmt: skip
-    v, spring = np.zeros(nv), (np.ones(1), np.zeros(1))
-    load = none.reshape(0, 3)
-    evaluate(
-        M, v, frames, v, np.zeros(1), np.zeros((1, 2)), spring, shape, ground, rates, state, load,
-        torsion, instant,
-    )  # fmt: skip
-    project(instant[7], instant[10], ground[0], instant[8])
-    demand(ground[0], one, one, one, one, 50.0, 1e-3, one.copy())
-    margins(ground[0], one, one, np.zeros(1), state[0], 1.0, np.zeros(1))
+    arguments = example()
+    evaluate(*arguments)
+    C, state, data, sizes = arguments[1][6], arguments[2], arguments[5], arguments[6]
+    one, instant = np.zeros((1, 3)), parts(data, sizes)
+    project(instant[15], instant[11], C, state[0], instant[13])
+    demand(C, one, one, one, one, 50.0, 1e-3, one.copy())
+    smallest_margin(C, one, one, np.zeros(1), state[0], 1.0)

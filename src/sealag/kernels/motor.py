@@ -224,7 +224,9 @@ def _apply_after(A, z, time, E, out):
 
 
 @njit(cache=True)
-def predict(parameters, instant, tau_osc, tau_measured, z, step, half_step, regular, out):
+def predict(
+    parameters, instant, tau_osc, tau_measured, z, step, half_step, whole_step, regular, out
+):
     """Motor angle and speed half a step and a step ahead, out (n, 2, 2); z is not moved."""
     A = np.empty((SIZE, SIZE))
     Q = np.empty((PRODUCTS, SIZE, SIZE))
@@ -235,16 +237,24 @@ def predict(parameters, instant, tau_osc, tau_measured, z, step, half_step, regu
         now[:] = z[i]
         variant, _ = choose(parameters[i], instant, tau_osc[i], tau_measured[i], now)
         if regular:
-            _apply(half_step[i, variant], now, then)
-            out[i, 0, 0], out[i, 0, 1] = then[0], then[1]
-            _apply(half_step[i, variant], then, now)
+            _move_rotor(half_step[i, variant], now, out[i, 0])
+            _move_rotor(whole_step[i, variant], now, out[i, 1])
         else:
             generator(parameters[i], instant, variant, A, Q)
             exponential(A, 0.5 * step, E)
             _apply(E, now, then)
             out[i, 0, 0], out[i, 0, 1] = then[0], then[1]
-            _apply(E, then, now)
-        out[i, 1, 0], out[i, 1, 1] = now[0], now[1]
+            _move_rotor(E, then, out[i, 1])
+
+
+@njit(cache=True)
+def _move_rotor(E, z, out):
+    """Write angle and speed (2,) of E z."""
+    for i in range(2):
+        s = 0.0
+        for j in range(SIZE):
+            s += E[i, j] * z[j]
+        out[i] = s
 
 
 @njit(cache=True)
@@ -259,8 +269,26 @@ def link_cubic(z, q_0, v_0, q_1, v_1, step):
 
 
 @njit(cache=True)
-def move(parameters, instant, tau_osc, tau_measured, z, step, tables_E, tables_W, regular, work):
-    """Move every joint over the step along its link's cubic; add to its works (n, 7)."""
+def _add_works(W, z, after, tau_osc, work):
+    """Add zᵀ W_k z of the symmetric forms, and the works that follow from the way travelled."""
+    for k in range(PRODUCTS):
+        s = 0.0
+        for a in range(SIZE):
+            t = 0.5 * W[k, a, a] * z[a]
+            for b in range(a + 1, SIZE):
+                t += W[k, a, b] * z[b]
+            s += z[a] * t
+        work[k] += 2.0 * s
+    travel = after[0] - z[0]
+    work[5] += abs(travel)
+    work[6] += tau_osc * travel
+
+
+@njit(cache=True)
+def move(
+    parameters, instant, tau_osc, tau_measured, z, step, tables_E, tables_W, regular, book, work
+):
+    """Move every joint over the step along its link's cubic; if ``book``, add its works (n, 7)."""
     A = np.empty((SIZE, SIZE))
     Q = np.empty((PRODUCTS, SIZE, SIZE))
     E = np.empty((SIZE, SIZE))
@@ -272,35 +300,29 @@ def move(parameters, instant, tau_osc, tau_measured, z, step, tables_E, tables_W
         for _ in range(8):
             p = parameters[i]
             variant, direction = choose(p, instant, tau_osc[i], tau_measured[i], z[i])
-            if whole:
-                E[:] = tables_E[i, variant]
-                W[:] = tables_W[i, variant]
-            else:
+            if not whole:
                 generator(p, instant, variant, A, Q)
-                advance(A, Q, left, E, W)
-            _apply(E, z[i], after)
+                exponential(A, left, E)
+            _apply(tables_E[i, variant] if whole else E, z[i], after)
             span = left
             reversing = direction != 0.0 and after[1] * direction < 0.0
             if reversing:
+                whole = False
                 if z[i, 1] == 0.0:
                     variant = variant % 2 + LOCKED
                     z[i, 8] = 0.0
-                    generator(p, instant, variant, A, Q)
                     reversing = False
+                    generator(p, instant, variant, A, Q)
                 else:
                     generator(p, instant, variant, A, Q)
                     span = _reversal(A, z[i], direction, left, E, after)
-                advance(A, Q, span, E, W)
+                exponential(A, span, E)
                 _apply(E, z[i], after)
-            for k in range(PRODUCTS):
-                s = 0.0
-                for a in range(SIZE):
-                    for b in range(SIZE):
-                        s += z[i, a] * W[k, a, b] * z[i, b]
-                work[i, k] += s
-            travel = after[0] - z[i, 0]
-            work[i, 5] += abs(travel)
-            work[i, 6] += tau_osc[i] * travel
+            if book:
+                if not whole:
+                    advance(A, Q, span, E, W)
+                form = tables_W[i, variant] if whole else W
+                _add_works(form, z[i], after, tau_osc[i], work[i])
             z[i] = after
             if reversing:
                 z[i, 1] = 0.0
@@ -350,9 +372,9 @@ def warm() -> None:
     forms = np.empty((1, 4, PRODUCTS, SIZE, SIZE))
     tables(parameters, 1.0, 1e-3, half, whole, forms)
     z, tau, work, ahead = np.zeros((1, SIZE)), np.zeros(1), np.zeros((1, 7)), np.zeros((1, 2, 2))
-    predict(parameters, 1.0, tau, tau, z, 1e-3, half, True, ahead)
+    predict(parameters, 1.0, tau, tau, z, 1e-3, half, whole, True, ahead)
     link_cubic(z, tau, tau, tau, tau, 1e-3)
-    move(parameters, 1.0, tau, tau, z, 1e-3, whole, forms, True, work)
+    move(parameters, 1.0, tau, tau, z, 1e-3, whole, forms, True, True, work)
     energy, joint, scalar = np.zeros(4), np.zeros((8, 1)), np.zeros(5)
     stores(parameters, z, tau, 0.0, 0.0, energy)
     powers = np.zeros((4, 5))

@@ -1,7 +1,4 @@
-"""Walking kernels: quintic references, the pendulum under a planned height, prediction, torques.
-
-The robot's terms M, h, J and J̇v are those of one instant; feet are point contacts (3 rows each).
-"""
+"""Walking kernels: quintic references, the pendulum under a planned height, foothold and swing."""
 
 import numpy as np
 from numba import njit
@@ -80,120 +77,76 @@ def pendulum(x, v, begin, end, transfer, old, new, height, offset, steps):
 
 
 @njit(cache=True)
-def constrain(M_inverse, h, J, b, n):
-    """Return a_0 (nv,), P (nv, n) of v̇ = a_0 + P τ under the contact rows J v̇ = −b.
+def capture_end(com, speed, momentum, old, new, height, offset, phase, gait, share, memory):
+    """Average where the present step ends and write the foothold it asks for.
 
     Args:
-        M_inverse: (nv, nv).
-        h: (nv,) Coriolis and gravity torques.
-        J: (c, nv) contact rows.
-        b: (c,) J̇ v.
-        n: number of actuated joints, the last velocities.
-    """
-    X = M_inverse @ J.T
-    Y = np.linalg.solve(J @ X, X.T)
-    N = M_inverse - X @ Y
-    a_0 = -(N @ h) - Y.T @ b
-    return a_0, np.ascontiguousarray(N[:, N.shape[0] - n :])
-
-
-@njit(cache=True)
-def damped_solve(A, r, damping):
-    """Return the least-squares solution of A x = r, damped where A is nearly singular.
-
-    Args:
-        A: (m, m).
-        r: (m,).
-        damping: share of the trace of AᵀA that is added to it.
-    """
-    G = A.T @ A
-    add = damping * np.trace(G) + 1e-300
-    for i in range(G.shape[0]):
-        G[i, i] += add
-    return np.linalg.solve(G, A.T @ r)
-
-
-@njit(cache=True)
-def task_torques(a_0, P, J_t, b_t, wanted, damping):
-    """Return τ (n,) and v̇ (nv,) that give the tasks the accelerations wanted.
-
-    Args:
-        a_0: (nv,) acceleration without torque.
-        P: (nv, n) mobility, from `constrain`.
-        J_t: (n, nv) as many task rows as joints.
-        b_t: (n,) J̇_t v.
-        wanted: (n,) task accelerations.
-        damping: see `damped_solve`.
-    """
-    tau = damped_solve(J_t @ P, wanted - b_t - J_t @ a_0, damping)
-    return tau, a_0 + P @ tau
-
-
-@njit(cache=True)
-def predict(M, h, J, b, q_joint, v, motor, K, table, start, period, ticks, arrival, command,
-            newest, begin, end):  # fmt: skip
-    """Predict links, springs and motors under the commands still in flight.
-
-    The links' terms are frozen at the measured instant; the motors move exactly between ticks
-    with the link angle linear over a tick.
-
-    Args:
-        M: (nv, nv) mass matrix.
-        h: (nv,) Coriolis and gravity torques.
-        J: (2, 3, nv) rows of the foot that is left and of the foot stood on.
-        b: (2, 3) their J̇ v.
-        q_joint: (n,) link-side joint positions.
-        v: (nv,) velocity; moved.
-        motor: (n, 2) motor angles and speeds; moved.
-        K: (n,) spring stiffness.
-        table: (n, 2, 4) exact motor step: of θ, θ̇, force and force rate.
-        start: instant of the measurement, s.
-        period: s.
-        ticks: number of periods to predict.
-        arrival: (k,) ring of the commands' expected arrivals, s.
-        command: (k, n) ring of the commands.
-        newest: place of the newest command in the ring.
-        begin: instant at which the new foot touches down, s.
-        end: instant at which the old foot lifts off, s.
+        com: (3,) m.
+        speed: (3,) of the CoM, m/s.
+        momentum: (2,) what the angular momentum adds to the horizontal speed, m/s.
+        old: (3,) foot left.
+        new: (3,) foot stood on.
+        height: (6,) quintic of the height over the world's zero.
+        offset: phase at which the quintic's time is 0, s.
+        phase: now, s.
+        gait: step time, weight transfer (s); ω, e and κ of the periodic gait; wanted forward and
+            outward capture point (m); bounds of the forward (2) and outward (2) foothold (m); sign
+            of outward.
+        share: of the new end in the average.
+        memory: (2, 2) averaged position and speed at the end, moved.
 
     Returns:
-        (nv,) displacement in the tangent space of the measured configuration.
+        x and y of the foothold, m.
     """
-    nv, n = v.size, K.size
-    base = nv - n
-    M_inverse = np.linalg.inv(M)
-    moved = np.zeros(nv)
-    a_0, P = np.zeros(nv), np.zeros((nv, n))
-    mode = -1
-    for i in range(ticks):
-        t = start + (i + 0.5) * period
-        now = 0 if t < begin else (1 if t < end else 2)
-        if now != mode:
-            mode = now
-            first, last = (1, 2) if mode == 2 else ((0, 1) if mode == 0 else (0, 2))
-            rows = J[first:last].copy().reshape(3 * (last - first), nv)
-            bias = b[first:last].copy().reshape(3 * (last - first))
-            a_0, P = constrain(M_inverse, h, rows, bias, n)
-        k = newest
-        for _ in range(arrival.size):
-            if arrival[k] <= t:
-                break
-            k = (k - 1) % arrival.size
-        before = q_joint + moved[base:]
-        v += period * (a_0 + P @ (K * (motor[:, 0] - before)))
-        moved += period * v
-        for j in range(n):
-            force = command[k, j] + K[j] * before[j]
-            rate = K[j] * v[base + j]
-            theta, speed = motor[j, 0], motor[j, 1]
-            for r in range(2):
-                motor[j, r] = (
-                    table[j, r, 0] * theta
-                    + table[j, r, 1] * speed
-                    + table[j, r, 2] * force
-                    + table[j, r, 3] * rate
-                )
-    return moved
+    T, transfer, rate, growth, carried = gait[0], gait[1], gait[2], gait[3], gait[4]
+    side = gait[11]
+    x, v = com[:2].copy(), speed[:2] + momentum
+    pendulum(x, v, phase, T, transfer, old, new, height, offset, 16)
+    for k in range(2):
+        memory[0, k] += share * (x[k] - memory[0, k])
+        memory[1, k] += share * (v[k] - memory[1, k])
+        capture = memory[0, k] + memory[1, k] / rate - new[k]
+        wanted = gait[5] if k == 0 else -side * gait[6]
+        x[k] = (growth * capture - wanted) / (growth - carried)
+    forward = min(max(x[0], gait[7]), gait[8])
+    outward = min(max(side * x[1], gait[9]), gait[10])
+    return new[0] + forward, new[1] + side * outward
+
+
+@njit(cache=True)
+def swing(now, target, phase, period, gait, lift, bump):
+    """Move the swing foot's reference by one period; late, lower it until it meets the ground.
+
+    Args:
+        now: (3, 3) position, velocity and acceleration one period ago, moved.
+        target: (3,) where it shall land, m.
+        phase: of the step, s.
+        period: s.
+        gait: step time, weight transfer (s), share of the swing after which the foot no longer
+            moves horizontally, and speed at which a late foot is lowered (m/s).
+        lift: height at which it left the ground, m.
+        bump: height of the middle of its path over the straight line, m.
+    """
+    T, transfer = gait[0], gait[1]
+    duration = T - transfer
+    left = transfer + gait[2] * duration - phase
+    c, end = np.empty(6), np.zeros(3)
+    for i in range(2):
+        if left > 0.015:
+            end[0] = target[i]
+            quintic(now[:, i], end, left, c)
+            quintic_at(c, min(period, left), now[:, i])
+        else:
+            now[1, i], now[2, i] = 0.0, 0.0
+    u = min(max((phase - transfer) / duration, 0.0), 1.0)
+    w, rise = 1.0 - u, target[2] - lift
+    if u >= 1.0:
+        now[0, 2], now[1, 2], now[2, 2] = target[2] - gait[3] * (phase - T), -gait[3], 0.0
+        return
+    now[0, 2] = lift + rise * u**3 * (10 - 15 * u + 6 * u * u) + 64 * bump * (u * w) ** 3
+    rate = 30 * rise * (u * w) ** 2 + 192 * bump * (u * w) ** 2 * (w - u)
+    bend = 60 * rise * u * w * (w - u) + 384 * bump * u * w * ((w - u) ** 2 - u * w)
+    now[1, 2], now[2, 2] = rate / duration, bend / duration**2
 
 
 def warm() -> None:
@@ -203,12 +156,6 @@ def warm() -> None:
     quintic_at(c, 0.5, out)
     c[0] = 1.0
     pendulum(np.zeros(2), np.zeros(2), 0.0, 0.1, 0.05, foot, foot, c, 0.0, 2)
-    nv, n = 7, 6
-    J_t = np.ascontiguousarray(np.eye(nv)[1:])
-    a_0, P = constrain(np.eye(nv), np.zeros(nv), np.eye(nv)[:1].copy(), np.zeros(1), n)
-    task_torques(a_0, P, J_t, np.zeros(n), np.ones(n), 1e-8)
-    predict(
-        np.eye(nv), np.zeros(nv), np.ascontiguousarray(np.eye(nv)[:6].reshape(2, 3, nv)),
-        np.zeros((2, 3)), np.zeros(n), np.zeros(nv), np.zeros((n, 2)), np.ones(n),
-        np.zeros((n, 2, 4)), 0.0, 1e-3, 3, np.zeros(4), np.zeros((4, n)), 0, 1e-3, 2e-3,
-    )  # fmt: skip
+    two, gait = np.zeros(2), np.arange(1.0, 13.0)
+    capture_end(foot, foot, two, foot, foot, c, 0.0, 0.1, gait, 1.0, np.zeros((2, 2)))
+    swing(np.zeros((3, 3)), foot, 0.1, 1e-3, np.array([0.35, 0.06, 0.9, 0.3]), 0.0, 0.1)

@@ -1,6 +1,7 @@
 """Ground height as a function of place."""
 
-from dataclasses import dataclass
+from bisect import bisect_right
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -59,6 +60,7 @@ class ProfileTerrain:
 
     x: Array
     z: Array
+    _points: tuple[list[float], list[float]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check the points."""
@@ -69,6 +71,7 @@ class ProfileTerrain:
             raise InputError("A terrain profile must be finite.")
         object.__setattr__(self, "x", x)
         object.__setattr__(self, "z", z)
+        object.__setattr__(self, "_points", (x.tolist(), z.tolist()))
 
     def height(self, x: float, y: float) -> float:
         """Return the interpolated height.
@@ -77,7 +80,11 @@ class ProfileTerrain:
             x: forward, m.
             y: left, m; it has no influence.
         """
-        return float(np.interp(x, self.x, self.z))
+        xs, zs = self._points
+        k = bisect_right(xs, x)
+        if k == 0 or k == len(xs):
+            return zs[k and -1]
+        return zs[k - 1] + (zs[k] - zs[k - 1]) / (xs[k] - xs[k - 1]) * (x - xs[k - 1])
 
 
 def paper_terrain() -> ProfileTerrain:

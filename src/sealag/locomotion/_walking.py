@@ -10,7 +10,7 @@ from sealag.locomotion._terrain import Terrain
 from sealag.locomotion._walking_options import Prediction, WalkingGait, WalkingOptions
 from sealag.locomotion._walking_placement import Placement
 from sealag.locomotion._walking_start import walking_start
-from sealag.locomotion._walking_state import Body, Odometry, Predictor, tilt
+from sealag.locomotion._walking_state import Body, Estimator
 from sealag.locomotion._walking_step import StepReferences
 from sealag.robot import Robot
 from sealag.typing import Array
@@ -59,7 +59,7 @@ class WalkingController:
         options: WalkingOptions | None = None,
         period: float = 1e-3,
     ) -> None:
-        from sealag.kernels import walking
+        from sealag.kernels import walking_law
 
         if robot.nv_base != 6 or robot.n != 6:
             raise InputError(
@@ -68,7 +68,7 @@ class WalkingController:
             )
         if not (math.isfinite(period) and period > 0.0):
             raise InputError(f"the controller's period must be a time > 0 s, got {period}")
-        self._kernel, self._robot, self._actuators = walking, robot, actuators
+        self._kernel, self._robot, self._actuators = walking_law, robot, actuators
         self._terrain, self._period = terrain, period
         self.feet = tuple(robot.check_frame(foot) for foot in feet)
         self.gait, self.options = gait or WalkingGait(), options or WalkingOptions()
@@ -76,9 +76,12 @@ class WalkingController:
         self._torque_limit = np.where(np.isfinite(robot.effort_limit), robot.effort_limit, 1e3)
         self._D = np.ascontiguousarray(actuators.motor_damping)
         self._D_by_K = actuators.motor_damping / actuators.spring_stiffness
-        self._rows = np.zeros((6, robot.nv))
-        self._bias, self._wanted, self._height = np.zeros(6), np.zeros(6), np.zeros(3)
-        self._spin = np.zeros((3, robot.nv))
+        self._estimator = Estimator(
+            robot, actuators, period=period, prediction=self.options.prediction,
+            odometry=self.options.odometry,
+        )  # fmt: skip
+        self._gains, self._embedded_gains = _gains(self.options, period)
+        self._rates, self._smooth, self._first = np.zeros(robot.n), np.zeros(robot.n), True
         self.tau_task = np.zeros(robot.n)
         self.touchdowns: list[tuple[float, int, Array]] = []
 
@@ -96,22 +99,21 @@ class WalkingController:
         if contact.size != 2 or (contact > 0.0).sum() != 1:
             raise InputError("a walk begins with one of two feet on the ground")
         gait, body = self.gait, self._body
-        body.update(measurement.q, measurement.v)
+        body.q[:], body.v[:] = measurement.q, measurement.v
+        body.update()
         self.placement = Placement(gait, self.options, self._robot.mass)
         self.step = StepReferences(gait, self._terrain, step_length=self.placement.plan.step_length)
         self.step.stance = int(contact.argmax())
+        feet = np.stack([body.foot(0), body.foot(1)])
         self.step.start(
             t,
             phase=0.5 * (gait.step_time + gait.transfer_time),
-            com=np.array([body.com[2], body.com_rate[2]]),
-            feet=body.feet,
-            swing=body.feet_rate[1 - self.step.stance],
+            com=np.array([body.com[0][2], body.com[1][2]]),
+            feet=feet,
+            swing=body.foot_rate(1 - self.step.stance),
         )
-        self._odometry = Odometry(body.feet, self.step.stance)
-        self._predictor = Predictor(
-            self._robot, self._actuators, period=self._period, prediction=self.options.prediction
-        )
-        self._smooth: Array | None = None
+        self._estimator.reset(feet, self.step.stance)
+        self._first = True
         self.touchdowns.clear()
 
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
@@ -133,18 +135,22 @@ class WalkingController:
         step, body = self.step, self._body
         phase = step.phase(now)
         self.placement.update(
-            phase, step, body.com, body.com_rate, angular=body.angular, period=self._period
+            phase, step, body.com[0], body.com[1], angular=body.angular, period=self._period
         )
         if phase >= self.gait.transfer_time:
             if not step.swinging:
-                step.lift(body.feet[1 - step.stance])
+                step.lift(body.foot(1 - step.stance))
             step.move(now, self._period)
-        rates = self._tasks(now, phase)
-        if not math.isfinite(self.tau_task.sum()):
+        if not self._tasks(now, phase):
             raise SolverError("the walking law has no finite torque in this state")
-        np.clip(self.tau_task, -self._torque_limit, self._torque_limit, out=self.tau_task)
-        out[:] = self._embedded(rates)
-        self._predictor.sent(out, t + age + options.embedded_delay)
+        if self._first:
+            limit = self._torque_limit
+            self._smooth[:], self._first = self.tau_task.clip(-limit, limit), False
+        self._kernel.carry(
+            self.tau_task, self._torque_limit, self._smooth, self._rates, self._estimator.tau_sea,
+            self._D, self._D_by_K, self._embedded_gains, out,
+        )  # fmt: skip
+        self._estimator.sent(out, t + age + options.embedded_delay)
 
     def motor_start(self, q: Array, v: Array, *, stance: int = 1) -> Array:
         """Return motor angles (n,) whose springs carry the first task torque, rad.
@@ -165,24 +171,20 @@ class WalkingController:
     # State ---------------------------------------------------------------------------------------
     def _observe(self, measurement: Measurement, now: float) -> None:
         """Estimate and predict the state, and evaluate the robot's terms there."""
-        options, body, q = self.options, self._body, measurement.q.copy()
-        v = measurement.v.copy()
+        options, body, stiffness = self.options, self._body, self._actuators.spring_stiffness
+        body.q[:], body.v[:] = measurement.q, measurement.v
         if options.feedback == Feedback.MOTOR:
-            q[-6:] = measurement.theta
+            body.q[-6:] = measurement.theta
         elif options.feedback == Feedback.STATIC_JOINT:
-            q[-6:] = measurement.theta - self.tau_task / self._actuators.spring_stiffness
-        body.update(q, v)
-        if options.odometry:
-            self._odometry.correct(q, v, body, self.step, t=measurement.time)
-            body.update(q, v)
-        if options.prediction != Prediction.NONE:
-            self._predictor.move(
-                q, v, body, self.step, theta=measurement.theta,
-                theta_dot=measurement.theta_dot, measured=measurement.time, now=now,
-            )  # fmt: skip
-            body.update(q, v)
-        else:
-            self._predictor.tau_sea[:] = measurement.tau_sea
+            body.q[-6:] = measurement.theta - self.tau_task / stiffness
+        body.update()
+        self._estimator.move(
+            body, self.step, theta=measurement.theta, theta_dot=measurement.theta_dot,
+            measured=measurement.time, now=now,
+        )  # fmt: skip
+        body.update()
+        if options.prediction == Prediction.NONE:
+            self._estimator.tau_sea[:] = measurement.tau_sea
 
     def _switch(self, now: float, contact: Array) -> None:
         """Begin the next step when planned, or when the swing foot is seen on the ground."""
@@ -191,87 +193,34 @@ class WalkingController:
         touched = self.options.early_contact and late and contact[1 - step.stance] > 0.0
         if touched or step.phase(now) >= gait.step_time - 1e-9:
             self.touchdowns.append((now, 1 - step.stance, step.target.copy()))
-            step.change(now, self._body.feet)
+            step.change(now, np.stack([self._body.foot(0), self._body.foot(1)]))
             self.placement.restart()
 
     # Law -----------------------------------------------------------------------------------------
-    def _tasks(self, now: float, phase: float) -> Array:
-        """Set ``tau_task`` and return the planned joint rates (n,)."""
-        options, body, step = self.options, self._body, self.step
-        transfer, swing = self.gait.transfer_time, 1 - step.stance
-        step.height_at(now, self._height)
-        roll, pitch, yaw = tilt(body.R)
-        heading = np.array(
-            [[math.cos(yaw), math.sin(yaw), 0.0], [-math.sin(yaw), math.cos(yaw), 0]]
-        )
-        self._spin[:, 3:6] = body.R
-        turn = self._spin @ body.v
-        gains = (options.height_stiffness, options.posture_stiffness, options.swing_stiffness)
-        damping = [2.0 * options.task_damping * math.sqrt(k) for k in gains]
-        planned = 1.0 if options.acceleration_feedforward else 0.0
-        z, z_rate, z_bend = self._height.tolist()
-        wanted = self._wanted
-        wanted[0] = planned * z_bend + gains[0] * (z - body.com[2])
-        wanted[0] += damping[0] * (z_rate - body.com_rate[2])
-        wanted[1] = -gains[1] * roll
-        wanted[2] = -gains[1] * pitch
-        wanted[1:3] -= damping[1] * (heading @ turn)
-        posture, rate = heading @ self._spin, np.zeros(3)
-        if not options.acceleration_feedforward:
-            body.forget_velocity()
-        M_inverse = np.linalg.inv(body.M)
-        if phase < transfer:
-            wanted[3:] = 0.0
-            share = phase / transfer
-            self.tau_task[:] = share * self._support(M_inverse, step.stance, posture)
-            self.tau_task += (1.0 - share) * self._support(M_inverse, swing, posture)
-        else:
-            error = step.swing[0] - body.feet[swing]
-            rate = step.swing[1] + options.position_rate * error
-            wanted[3:] = planned * step.swing[2] + gains[2] * error
-            wanted[3:] += damping[2] * (step.swing[1] - body.feet_rate[swing])
-            self.tau_task[:] = self._support(M_inverse, step.stance, posture)
-        return self._planned_rates(z_rate, rate, posture, spin=float(turn[2]))
-
-    def _support(self, M_inverse: Array, stance: int, posture: Array) -> Array:
-        """Return the torque (n,) that gives the tasks ``_wanted`` while standing on one foot."""
-        body, swing = self._body, 1 - stance
-        self._rows[0], self._rows[1:3] = body.com_jacobian[2], posture
-        self._rows[3:] = body.J[swing]
-        self._bias[0], self._bias[3:] = body.com_bias[2], body.b[swing]
-        a_0, P = self._kernel.constrain(M_inverse, body.h, body.J[stance], body.b[stance], 6)
-        tau, _ = self._kernel.task_torques(a_0, P, self._rows, self._bias, self._wanted, _DAMPING)
-        return tau
-
-    def _planned_rates(self, rise: float, swing: Array, posture: Array, *, spin: float) -> Array:
-        """Return the joint rates (n,) of the planned tasks and the predicted passive motion."""
+    def _tasks(self, now: float, phase: float) -> bool:
+        """Set ``tau_task`` and the planned joint rates; return whether they are finite."""
         body, step = self._body, self.step
-        rows = np.vstack(
-            [
-                body.J[step.stance], body.com_jacobian[2:], posture, body.J[1 - step.stance],
-                body.com_jacobian[:2], self._spin[2:],
-            ]
+        still = not self.options.acceleration_feedforward
+        return self._kernel.law(
+            body.terms, body.mounts, body.com, body.v, body.gravity() if still else body.terms[1],
+            still, step.height, step.swing, phase,
+            (self.gait.transfer_time, step.height_time(now)), step.stance, self._gains,
+            self.tau_task, self._rates,
         )  # fmt: skip
-        rates = np.zeros(12)
-        rates[3], rates[6:9], rates[9:11], rates[11] = rise, swing, body.com_rate[:2], spin
-        return self._kernel.damped_solve(rows, rates, _DAMPING)[6:]
 
-    def _embedded(self, rates: Array) -> Array:
-        """Return the command (n,) that makes springs and motors carry the task torque."""
-        options, tau = self.options, self.tau_task
-        command = tau.copy()
-        if options.lead:
-            if self._smooth is None:
-                self._smooth = tau.copy()
-            keep = math.exp(-self._period / options.lead_time)
-            self._smooth = tau + keep * (self._smooth - tau)
-            slope = (tau - self._smooth) / options.lead_time
-            command = self._smooth + self._D_by_K * slope
-        if options.velocity_feedforward:
-            command += self._D * rates
-        if options.torque_feedback > 0.0:
-            command += options.torque_feedback * (tau - self._predictor.tau_sea)
-        return command
+
+def _gains(options: WalkingOptions, period: float) -> tuple[Array, Array]:
+    """Return the numbers that the kernels of law and command take."""
+    stiffness = [options.height_stiffness, options.posture_stiffness, options.swing_stiffness]
+    damping = [2.0 * options.task_damping * math.sqrt(k) for k in stiffness]
+    planned = 1.0 if options.acceleration_feedforward else 0.0
+    lead = options.lead_time if options.lead else 0.0
+    keep = math.exp(-period / options.lead_time)
+    forward = 1.0 if options.velocity_feedforward else 0.0
+    return (
+        np.array([*stiffness, *damping, planned, options.position_rate, _DAMPING]),
+        np.array([keep, lead, forward, options.torque_feedback]),
+    )
 
 
 def begin_walk(

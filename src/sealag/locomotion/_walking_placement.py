@@ -10,7 +10,6 @@ from sealag.locomotion._walking_step import StepReferences
 from sealag.typing import Array
 
 GRAVITY = 9.81
-_STEPS = 16
 _FORWARD = (-0.15, 0.55)  # m from the stance foot: what the legs reach
 _WIDEST = 0.5  # m
 _FASTER = 0.3  # largest relative correction of the speed
@@ -87,8 +86,14 @@ class Placement:
 
         self._kernel, self._gait, self._options, self._mass = walking, gait, options, mass
         self.plan = periodic_gait(gait)
-        self._x, self._v = np.zeros(2), np.zeros(2)
-        self._end_x, self._end_v = np.zeros(2), np.zeros(2)
+        plan = self.plan
+        self._numbers = np.array(
+            [
+                gait.step_time, gait.transfer_time, plan.rate, plan.growth, plan.carried,
+                plan.end_forward, plan.end_outward, *_FORWARD, gait.smallest_width, _WIDEST, 1.0,
+            ]
+        )  # fmt: skip
+        self._end, self._momentum = np.zeros((2, 2)), np.zeros(2)
         self._fresh = True
         self._started, self._before, self._faster = False, 0.0, 0.0
 
@@ -110,25 +115,24 @@ class Placement:
             angular: Angular momentum about the CoM (3,), kg m²/s.
             period: Time since the last call, s.
         """
-        gait, options = self._gait, self._options
-        self._x[:], self._v[:] = com[:2], com_rate[:2]
-        arm = max(float(com[2] - step.new[2]), 0.4)
+        gait, options, numbers = self._gait, self._options, self._numbers
+        speed, momentum = float(com_rate[0]), self._momentum
         if options.momentum_placement:
-            self._v[0] += angular[1] / (self._mass * arm)
-            self._v[1] -= angular[0] / (self._mass * arm)
-        self._watch_apex(float(com[0] - step.new[0]), float(com_rate[0]), float(self._v[0]))
-        self._kernel.pendulum(
-            self._x, self._v, phase, gait.step_time, gait.transfer_time, step.old, step.new,
-            step.height, step.offset, _STEPS,
-        )  # fmt: skip
+            weight = self._mass * max(float(com[2] - step.new[2]), 0.4)
+            momentum[0], momentum[1] = angular[1] / weight, -angular[0] / weight
+        self._watch_apex(float(com[0] - step.new[0]), speed, speed + float(momentum[0]))
         share = 1.0
         if not self._fresh and options.placement_time > 0.0:
             share = 1.0 - math.exp(-period / options.placement_time)
         self._fresh = False
-        self._end_x += share * (self._x - self._end_x)
-        self._end_v += share * (self._v - self._end_v)
+        faster = 1.0 + (self._faster if options.bias_gain > 0.0 else 0.0)
+        numbers[5], numbers[11] = self.plan.end_forward * faster, step.outward()
+        x, y = self._kernel.capture_end(
+            com, com_rate, momentum, step.old, step.new, step.height, step.offset, phase, numbers,
+            share, self._end,
+        )  # fmt: skip
         if gait.step_time - phase > options.placement_freeze:
-            self._place(step)
+            step.target[0], step.target[1], step.target[2] = x, y, step.ground(x, y)
 
     def _watch_apex(self, ahead: float, speed: float, pendulum: float) -> None:
         """Integrate the relative error of the apex speed; begin with what the legs' momentum adds.
@@ -142,17 +146,3 @@ class Placement:
             self._faster += self._options.bias_gain * (planned - speed) / planned
             self._faster = min(max(self._faster, -_FASTER), _FASTER)
         self._before = ahead
-
-    def _place(self, step: StepReferences) -> None:
-        """Solve ξ(T) = u + ξ_plan for the foothold u of the next step."""
-        plan, side = self.plan, step.outward()
-        speed = 1.0 + (self._faster if self._options.bias_gain > 0.0 else 0.0)
-        wanted = (plan.end_forward * speed, -side * plan.end_outward)
-        u = [0.0, 0.0]
-        for k in range(2):
-            capture = self._end_x[k] + self._end_v[k] / plan.rate - step.new[k]
-            u[k] = (plan.growth * capture - wanted[k]) / (plan.growth - plan.carried)
-        outward = min(max(side * u[1], self._gait.smallest_width), _WIDEST)
-        step.target[0] = step.new[0] + min(max(u[0], _FORWARD[0]), _FORWARD[1])
-        step.target[1] = step.new[1] + side * outward
-        step.target[2] = step.ground(float(step.target[0]), float(step.target[1]))

@@ -1,6 +1,4 @@
-"""What the walking controller knows of the robot: body terms, odometry and prediction."""
-
-import math
+"""What the walking controller knows of the robot's state: body terms, odometry, prediction."""
 
 import numpy as np
 
@@ -14,116 +12,87 @@ _RING = 512
 
 
 class Body:
-    """Terms of the robot at one configuration and velocity.
+    """Configuration, velocity and terms of the robot as the controller believes them to be.
 
     Args:
         robot: The robot.
         feet: Frames of the left and the right foot.
+
+    Attributes:
+        q: Configuration (nq,).
+        v: Velocity (nv,).
+        terms: The robot's terms, as kernels take them.
+        mounts: How the feet are fixed, as kernels take it.
+        com: Position (3,), velocity (3,), acceleration at zero v̇ (3,) and Jacobian (3, nv) of the
+            centre of mass, live.
+        angular: Angular momentum about the centre of mass (3,), live.
     """
 
     def __init__(self, robot: Robot, feet: tuple[str, str]) -> None:
-        nv = robot.nv
         self._workspace, self._feet = robot.workspace(), feet
-        self.q, self.v = np.zeros(robot.nq), np.zeros(nv)
-        self.J, self.b = np.zeros((2, 3, nv)), np.zeros((2, 3))
-        self.feet, self.feet_rate = np.zeros((2, 3)), np.zeros((2, 3))
-        self.M, self.h, self.R = np.zeros((nv, nv)), np.zeros(nv), np.zeros((3, 3))
-        self.com, self.com_rate, self.com_bias = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.com_jacobian, self.angular = np.zeros((3, nv)), np.zeros(3)
-
-    def update(self, q: Array, v: Array) -> None:
-        """Evaluate everything.
-
-        Args:
-            q: Configuration (nq,).
-            v: Velocity (nv,).
-        """
         at = self._workspace
-        self.q[:], self.v[:] = q, v
+        self.q, self.v = robot.neutral(), np.zeros(robot.nv)
+        self.terms, self.mounts = at.terms, robot.frame_mounts(feet)
+        self.angular = at.momentum[3:]
         at.update(self.q, self.v)
-        self.M[:], self.h[:] = at.M, at.nle
-        for i, foot in enumerate(self._feet):
-            self.J[i] = at.frame_jacobian(foot)[:3]
-            self.b[i] = at.frame_bias(foot)[:3]
-            self.feet[i] = at.frame_placement(foot)[1]
-            self.feet_rate[i] = self.J[i] @ self.v
-        self.com[:], self.com_rate[:] = at.com, at.com_velocity
-        self.com_jacobian[:] = at.com_jacobian()
-        self.com_bias[:] = at.com_bias()
-        self.angular[:] = (at.centroidal_map() @ self.v)[3:]
-        _rotation(self.q[3:7], self.R)
+        self.com = at.com, at.com_velocity, at.com_bias(), at.com_jacobian()
 
-    def forget_velocity(self) -> None:
-        """Leave gravity alone of the velocity-dependent terms."""
-        self.h[:] = self._workspace.gravity()
-        self.b[:], self.com_bias[:] = 0.0, 0.0
+    def update(self) -> None:
+        """Evaluate the terms at ``q`` and ``v``."""
+        self._workspace.update(self.q, self.v)
+        self._workspace.com_bias()
 
+    def gravity(self) -> Array:
+        """Return the gravity torque (nv,)."""
+        return self._workspace.gravity()
 
-def _rotation(quaternion: Array, out: Array) -> None:
-    x, y, z, w = quaternion.tolist()
-    out[0] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
-    out[1] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
-    out[2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
+    def foot(self, foot: int) -> Array:
+        """Return a copy of a foot's position (3,), m."""
+        return self._workspace.frame_placement(self._feet[foot])[1].copy()
+
+    def foot_rate(self, foot: int) -> Array:
+        """Return a foot's velocity (3,), m/s."""
+        return self._workspace.frame_velocity(self._feet[foot])[:3]
 
 
-class Odometry:
-    """Base position and velocity from the stance leg, the joint encoders and the IMU.
+class Estimator:
+    """Estimates the state from a measurement, and predicts it to when the next command acts.
 
-    Args:
-        feet: Where both feet stand at the start (2, 3), m.
-        stance: Foot stood on at the start.
-    """
-
-    def __init__(self, feet: Array, stance: int) -> None:
-        self._anchor, self._stance = feet.copy(), stance
-
-    def correct(self, q: Array, v: Array, at: Body, step: StepReferences, *, t: float) -> None:
-        """Replace base position and linear velocity in ``q`` and ``v``.
-
-        Args:
-            q: Measured configuration (nq,); its position is replaced.
-            v: Measured velocity (nv,); its linear velocity is replaced.
-            at: The robot's terms at ``q``, ``v``.
-            step: The step's references.
-            t: Instant of the measurement, s.
-        """
-        foot = self._stance
-        shift = self._anchor[foot] - at.feet[foot]
-        if step.stance != foot and step.phase(t) >= 0.5 * step.transfer_time:
-            self._stance = foot = step.stance
-            self._anchor[foot] = at.feet[foot] + shift
-            x, y, _ = self._anchor[foot].tolist()
-            self._anchor[foot, 2] = step.ground(x, y)
-            shift = self._anchor[foot] - at.feet[foot]
-        q[:3] += shift
-        v[:3] -= at.R.T @ at.feet_rate[foot]
-
-
-class Predictor:
-    """Predicts the state at the instant at which the next command will act.
+    The base's position and velocity follow from the foot stood on, the joint encoders and the IMU.
 
     Args:
         robot: The robot.
         actuators: Springs and motors as the controller believes them to be.
         period: Of the controller, s.
         prediction: By which means.
+        odometry: Whether the measured place and velocity of the base are replaced.
     """
 
     def __init__(
-        self, robot: Robot, actuators: Actuators, *, period: float, prediction: Prediction
-    ) -> None:
-        from sealag.kernels import rigid, walking
+        self, robot: Robot, actuators: Actuators, *, period: float, prediction: Prediction,
+        odometry: bool,
+    ) -> None:  # fmt: skip
+        from sealag.kernels import walking_state
 
-        self._kernel, self._integrate = walking, rigid.integrate
-        self._period, self._prediction = period, prediction
-        self._base = robot.nv_base
+        self._kernel = walking_state
+        self._period, self._prediction, self._odometry = period, prediction, odometry
         self._K = np.ascontiguousarray(actuators.spring_stiffness)
         self._table = motor_table(actuators, period)
-        self._arrival, self._command = np.full(_RING, -np.inf), np.zeros((_RING, robot.n))
-        self._newest, self._any = 0, False
         self._motor = np.zeros((robot.n, 2))
-        self._displacement = np.zeros(robot.nv)
+        self._anchor, self._stance = np.zeros((2, 3)), 0
+        self._ring = np.full(_RING, -np.inf), np.zeros((_RING, robot.n))
+        self._newest, self._any = 0, False
         self.tau_sea = np.zeros(robot.n)
+
+    def reset(self, feet: Array, stance: int) -> None:
+        """Begin with both feet (2, 3) m at known places, and no command sent.
+
+        Args:
+            feet: Where they are, m.
+            stance: Foot stood on.
+        """
+        self._anchor[:], self._stance = feet, stance
+        self._ring[0][:], self._newest, self._any = -np.inf, 0, False
 
     def sent(self, command: Array, arrival: float) -> None:
         """Remember a command.
@@ -133,43 +102,47 @@ class Predictor:
             arrival: When it will reach the motors, s.
         """
         self._newest = (self._newest + 1) % _RING
-        self._command[self._newest], self._arrival[self._newest] = command, arrival
+        arrivals, commands = self._ring
+        commands[self._newest], arrivals[self._newest] = command, arrival
         if not self._any:
-            self._command[:], self._any = command, True
+            commands[:], self._any = command, True
 
     def move(
-        self, q: Array, v: Array, at: Body, step: StepReferences, *,
-        theta: Array, theta_dot: Array, measured: float, now: float,
+        self, body: Body, step: StepReferences, *, theta: Array, theta_dot: Array,
+        measured: float, now: float,
     ) -> None:  # fmt: skip
-        """Move ``q`` and ``v`` in place from the measurement's instant to ``now``.
+        """Move the body's q and v, evaluated at the measurement, to what they are ``now``.
 
         Args:
-            q: Configuration (nq,).
-            v: Velocity (nv,).
-            at: The robot's terms at that state.
+            body: The robot.
             step: The step's references.
             theta: Motor angles (n,), rad.
             theta_dot: Motor speeds (n,), rad/s.
             measured: Instant of the measurement, s.
             now: Instant to predict, s.
         """
-        n = theta.size
         ticks = round((now - measured) / self._period)
-        self._motor[:, 0], self._motor[:, 1] = theta, theta_dot
-        joints = q[-n:].copy()
-        moved = self._displacement
-        moved[:] = 0.0
         if self._prediction == Prediction.VELOCITY:
-            moved[:] = v * (now - measured)
-        elif self._prediction == Prediction.MODEL and ticks > 0 and self._any:
-            order = np.array([1 - step.stance, step.stance])
-            moved[:] = self._kernel.predict(
-                at.M, at.h, at.J[order], at.b[order], joints, v, self._motor, self._K,
-                self._table, measured, self._period, ticks, self._arrival, self._command,
-                self._newest, step.begin, step.begin + step.transfer_time,
-            )  # fmt: skip
-        self.tau_sea[:] = self._K * (self._motor[:, 0] - joints - moved[-n:])
-        self._integrate(q.copy(), moved, self._base, q)
+            ticks = -ticks
+        elif self._prediction == Prediction.NONE or not self._any:
+            ticks = 0
+        if self._odometry:
+            self._step_over(body, step, measured)
+        self._motor[:, 0], self._motor[:, 1] = theta, theta_dot
+        clock = measured, self._period, step.begin, step.begin + step.transfer_time
+        self._kernel.foresee(
+            body.terms, body.mounts, body.q, body.v, self._motor, step.stance,
+            self._stance if self._odometry else -1, self._anchor, self._K, self._table, clock,
+            ticks, self._ring, self._newest, self.tau_sea,
+        )  # fmt: skip
+
+    def _step_over(self, body: Body, step: StepReferences, t: float) -> None:
+        """Stand on the new foot once it carries half of the weight."""
+        old, new = self._stance, step.stance
+        if new != old and step.phase(t) >= 0.5 * step.transfer_time:
+            self._anchor[new] = self._anchor[old] + body.foot(new) - body.foot(old)
+            x, y, _ = self._anchor[new].tolist()
+            self._anchor[new, 2], self._stance = step.ground(x, y), new
 
 
 def motor_table(actuators: Actuators, period: float) -> Array:
@@ -194,13 +167,3 @@ def motor_table(actuators: Actuators, period: float) -> Array:
         A[1, 2] = 1.0 / inertia
         table[j] = expm(A * period)[:2]
     return table
-
-
-def tilt(R: Array) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw (rad) of a rotation matrix (3, 3), R = Rz Ry Rx."""
-    pitch = math.asin(min(1.0, max(-1.0, -float(R[2, 0]))))
-    return (
-        math.atan2(float(R[2, 1]), float(R[2, 2])),
-        pitch,
-        math.atan2(float(R[1, 0]), float(R[0, 0])),
-    )

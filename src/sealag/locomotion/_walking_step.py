@@ -43,8 +43,8 @@ class StepReferences:
         self.height = np.zeros(6)
         self.swing = np.zeros((3, 3))
         self.swinging = False
-        self._now, self._end, self._c = np.zeros(3), np.zeros(3), np.zeros(6)
-        self._moved = np.zeros(3)
+        self._now, self._end = np.zeros(3), np.zeros(3)
+        self._numbers = np.array([gait.step_time, gait.transfer_time, _STILL, _SEARCH])
         self._lift, self._bump = 0.0, gait.clearance
 
     def outward(self) -> float:
@@ -88,9 +88,7 @@ class StepReferences:
             t: Now, s.
             feet: Positions (2, 3), m.
         """
-        self._kernel.quintic_at(
-            self.height, min(self.phase(t), self._gait.step_time) - self.offset, self._now
-        )
+        self._kernel.quintic_at(self.height, self.height_time(t), self._now)
         self.begin, self.offset, self.stance = t, 0.0, 1 - self.stance
         self.old[:], self.new[:] = feet[1 - self.stance], feet[self.stance]
         self.swinging = False
@@ -108,11 +106,9 @@ class StepReferences:
         self._end[2] = 0.0
         self._kernel.quintic(self._now, self._end, self._gait.step_time - self.offset, self.height)
 
-    def height_at(self, t: float, out: Array) -> None:
-        """Write CoM height, rate and acceleration (3,) at ``t`` (s) into ``out``."""
-        self._kernel.quintic_at(
-            self.height, min(self.phase(t), self._gait.step_time) - self.offset, out
-        )
+    def height_time(self, t: float) -> float:
+        """Return the time (s) of the height's quintic at ``t`` (s)."""
+        return min(self.phase(t), self._gait.step_time) - self.offset
 
     def lift(self, foot: Array) -> None:
         """Begin the swing where the foot is (3,), m."""
@@ -133,29 +129,6 @@ class StepReferences:
 
     def move(self, t: float, period: float) -> None:
         """Move the swing reference to ``t`` (s), one ``period`` (s) after the last."""
-        gait, phase = self._gait, self.phase(t)
-        duration = gait.step_time - gait.transfer_time
-        left = gait.transfer_time + _STILL * duration - phase
-        for i in range(2):
-            if left > 0.015:
-                self._end[:] = self.target[i], 0.0, 0.0
-                self._kernel.quintic(self.swing[:, i], self._end, left, self._c)
-                self._kernel.quintic_at(self._c, min(period, left), self._moved)
-                self.swing[:, i] = self._moved
-            else:
-                self.swing[1:, i] = 0.0
-        u = min(max((phase - gait.transfer_time) / duration, 0.0), 1.0)
-        self._vertical(u, duration)
-        if u >= 1.0:
-            late = phase - gait.step_time
-            self.swing[:, 2] = self.target[2] - _SEARCH * late, -_SEARCH, 0.0
-
-    def _vertical(self, u: float, duration: float) -> None:
-        rise, w = self.target[2] - self._lift, 1.0 - u
-        self.swing[0, 2] = (
-            self._lift + rise * u**3 * (10 - 15 * u + 6 * u * u) + 64 * self._bump * (u * w) ** 3
+        self._kernel.swing(
+            self.swing, self.target, self.phase(t), period, self._numbers, self._lift, self._bump
         )
-        rate = 30 * rise * (u * w) ** 2 + 192 * self._bump * (u * w) ** 2 * (w - u)
-        bend = 60 * rise * u * w * (w - u)
-        bend += 384 * self._bump * u * w * ((w - u) ** 2 - u * w)
-        self.swing[1, 2], self.swing[2, 2] = rate / duration, bend / duration**2

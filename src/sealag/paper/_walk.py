@@ -16,7 +16,7 @@ from sealag.locomotion import (
     paper_terrain,
 )
 from sealag.paper._walk_errors import NoisySensors, SensorNoise, wrong_robot, wrong_springs
-from sealag.robot import Robot
+from sealag.robot import Robot, Workspace
 from sealag.simulation import (
     Clock,
     EventKind,
@@ -271,13 +271,7 @@ def measure_walk(robot: Robot, run: Run, case: WalkCase, *, task: Array) -> Walk
         task: Task torque of every tick (T, n), Nm.
     """
     at, names = robot.workspace(), tuple(dict.fromkeys(run.feet))
-    count = len(run.time)
-    com, speed, feet = np.zeros((count, 3)), np.zeros(count), np.zeros((count, 2, 3))
-    for i in range(count):
-        at.update(run.q[i], run.v[i])
-        com[i], speed[i] = at.com, at.com_velocity[0]
-        for f, frame in enumerate(names):
-            feet[i, f] = at.frame_placement(frame)[1]
+    com = np.array([at.center_of_mass(q) for q in run.q])
     first = int(run.contact_mode[0].argmax())
     times, foot = [0.0], [first]
     for event in run.events:
@@ -286,8 +280,8 @@ def measure_walk(robot: Robot, run: Run, case: WalkCase, *, task: Array) -> Walk
         if event.kind == EventKind.TOUCHDOWN and f != foot[-1] and late:
             times.append(event.time)
             foot.append(f)
-    index = np.minimum(np.searchsorted(run.time, times), count - 1)
-    place = feet[index, foot]
+    index = np.minimum(np.searchsorted(run.time, times), len(run.time) - 1)
+    place = np.array([robot.frame_placement(names[f], run.q[i])[1] for i, f in zip(index, foot)])
     side = np.array([_SIDE[f] for f in foot[1:]])
     stood = np.searchsorted(np.array(times), run.time, side="right") - 1
     ahead = com[:, 0] - place[stood, 0]
@@ -300,9 +294,14 @@ def measure_walk(robot: Robot, run: Run, case: WalkCase, *, task: Array) -> Walk
         foot=np.array(foot),
         place=place,
         apex_time=run.time[apex],
-        apex_speed=speed[apex],
+        apex_speed=np.array([_forward_speed(at, run.q[i], run.v[i]) for i in apex]),
         apex_step=stood[apex],
         step_width=side * np.diff(place[:, 1]),
         com=com,
         task=task,
     )
+
+
+def _forward_speed(at: Workspace, q: Array, v: Array) -> float:
+    at.update(q, v)
+    return float(at.com_velocity[0])

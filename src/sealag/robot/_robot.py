@@ -12,7 +12,7 @@ from sealag.errors import InputError, RobotError, near
 from sealag.robot._contact import Contact
 from sealag.robot._load import read_model, reduce_model, resolve_urdf
 from sealag.robot._workspace import Workspace
-from sealag.typing import Array, ArrayLike
+from sealag.typing import Array, ArrayLike, IntArray
 
 _UNLIMITED = 1e8
 
@@ -270,6 +270,31 @@ class Robot:
         if not self._model.existFrame(frame):
             raise near(frame, self.frame_names(), what=f"frame of {self.name}")
         return frame
+
+    def frame_mounts(self, frames: Sequence[str]) -> tuple[IntArray, Array, Array, IntArray]:
+        """Return how frames are fixed to their joints, as compiled kernels take it.
+
+        Args:
+            frames: F names.
+
+        Returns:
+            Numbers of the joints (F,), rotations (F, 3, 3) and positions (F, 3) in the joints'
+            axes, and 1 for every velocity that moves the frame (F, nv).
+
+        Raises:
+            UnknownNameError: a frame does not exist.
+        """
+        count, model = len(frames), self._model
+        joint, support = np.zeros(count, np.int64), np.zeros((count, self.nv), np.int64)
+        rotation, position = np.zeros((count, 3, 3)), np.zeros((count, 3))
+        for f, name in enumerate(frames):
+            frame = model.frames[model.getFrameId(self.check_frame(name))]
+            joint[f] = frame.parentJoint
+            rotation[f], position[f] = frame.placement.rotation, frame.placement.translation
+            for number in list(model.supports[frame.parentJoint])[1:]:
+                moved = model.joints[number]
+                support[f, moved.idx_v : moved.idx_v + moved.nv] = 1
+        return joint, rotation, position, support
 
     def frame_placement(self, frame: str, q: ArrayLike) -> tuple[Array, Array]:
         """Return a frame's rotation (3, 3) and position (3,) in the world.

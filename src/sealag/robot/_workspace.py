@@ -1,5 +1,6 @@
 """Memory for evaluating a robot's terms again and again, as a controller or simulator does."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,21 @@ _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 class Workspace:
     """All terms of a robot at one configuration and velocity; `update` first, then read.
 
-    Arrays are views of memory that the next `update` overwrites: copy what must last.
+    Arrays are views of memory that the next `update` overwrites: copy what must last, and keep
+    the workspace as long as its views.
 
     Attributes:
         nv: number of velocities.
         nv_base: number of base velocities, 6 or 0.
+        M: mass matrix (nv, nv), symmetric.
+        nle: Coriolis, centrifugal and gravity torques (nv,).
+        com: centre of mass (3,) in the world, m.
+        com_velocity: velocity (3,) of the centre of mass in the world, m/s.
+        momentum: centroidal momentum (6,): linear, then angular about the centre of mass.
+        terms: what compiled kernels take, live like the rest: M, nle, the joints' spatial
+            Jacobian (nv, 6) about the world's origin, and of every joint its rotation (N, 3, 3),
+            position (N, 3), spatial velocity (N, 6) and acceleration at zero v̇ (N, 6), both in its
+            own axes. `sealag.kernels.rigid.frames` makes frames of them.
     """
 
     def __init__(self, model: Any, *, nv_base: int) -> None:
@@ -30,10 +41,27 @@ class Workspace:
         self._model = model
         self._data = model.createData()
         self._zero = np.zeros(model.nv)
-        self._frames: dict[str, int] = {}
-        self.nv = int(model.nv)
+        self._frames: dict[str, tuple[int, Array, Array]] = {}
+        self.nv = nv = int(model.nv)
         self.nv_base = nv_base
         self._q = pin.neutral(model)
+        data = self._data
+        self.M: Array = data.M.reshape(nv, nv)
+        self.nle: Array = data.nle
+        self.com: Array = data.com[0]
+        self.com_velocity: Array = data.vcom[0]
+        self.momentum: Array = data.hg.vector
+        self._com_acceleration: Array = data.acom[0]
+        self._com_jacobian: Array = data.Jcom.reshape(3, nv)
+        self.terms: tuple[Array, ...] = (
+            self.M.T,
+            self.nle,
+            data.J.reshape(6, nv).T,
+            _stacked([placement.rotation for placement in data.oMi]),
+            _stacked([placement.translation for placement in data.oMi]),
+            _stacked([twist.vector for twist in data.v]),
+            _stacked([twist.vector for twist in data.a]),
+        )
 
     def update(self, q: Array, v: Array) -> None:
         """Evaluate everything at a configuration and velocity.
@@ -46,27 +74,6 @@ class Workspace:
         self._q = q
         pin.computeAllTerms(model, data, q, v)
         pin.forwardKinematics(model, data, q, v, self._zero)
-        pin.updateFramePlacements(model, data)
-
-    @property
-    def M(self) -> Array:
-        """Mass matrix (nv, nv), symmetric."""
-        return self._data.M
-
-    @property
-    def nle(self) -> Array:
-        """Coriolis, centrifugal and gravity torques (nv,)."""
-        return self._data.nle
-
-    @property
-    def com(self) -> Array:
-        """Centre of mass (3,) in the world, m."""
-        return self._data.com[0]
-
-    @property
-    def com_velocity(self) -> Array:
-        """Velocity (3,) of the centre of mass in the world, m/s."""
-        return self._data.vcom[0]
 
     @property
     def kinetic_energy(self) -> float:
@@ -84,12 +91,20 @@ class Workspace:
 
     def com_jacobian(self) -> Array:
         """Return the Jacobian (3, nv) of the centre of mass."""
-        return self._data.Jcom
+        return self._com_jacobian
+
+    def center_of_mass(self, q: Array) -> Array:
+        """Return a copy of the centre of mass (3,) at a configuration, and evaluate nothing else.
+
+        Args:
+            q: (nq,) configuration.
+        """
+        return pin.centerOfMass(self._model, self._data, q, False).copy()
 
     def com_bias(self) -> Array:
         """Return the acceleration (3,) of the centre of mass at zero joint acceleration."""
         pin.centerOfMass(self._model, self._data, pin.KinematicLevel.ACCELERATION)
-        return self._data.acom[0]
+        return self._com_acceleration
 
     def centroidal_map(self) -> Array:
         """Return the centroidal momentum matrix (6, nv): linear then angular, world axes."""
@@ -101,8 +116,9 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        placement = self._data.oMf[self._frame(frame)]
-        return placement.rotation, placement.translation
+        index, rotation, translation = self._frame(frame)
+        pin.updateFramePlacement(self._model, self._data, index)
+        return rotation, translation
 
     def frame_jacobian(self, frame: str) -> Array:
         """Return a frame's Jacobian (6, nv): linear then angular velocity, axes of the world.
@@ -110,7 +126,7 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        return pin.getFrameJacobian(self._model, self._data, self._frame(frame), _WORLD_ALIGNED)
+        return pin.getFrameJacobian(self._model, self._data, self._frame(frame)[0], _WORLD_ALIGNED)
 
     def frame_velocity(self, frame: str) -> Array:
         """Return a frame's velocity (6,): linear then angular, axes of the world.
@@ -119,7 +135,7 @@ class Workspace:
             frame: its name, which must exist.
         """
         return pin.getFrameVelocity(
-            self._model, self._data, self._frame(frame), _WORLD_ALIGNED
+            self._model, self._data, self._frame(frame)[0], _WORLD_ALIGNED
         ).vector
 
     def frame_bias(self, frame: str) -> Array:
@@ -129,11 +145,26 @@ class Workspace:
             frame: its name, which must exist.
         """
         return pin.getFrameClassicalAcceleration(
-            self._model, self._data, self._frame(frame), _WORLD_ALIGNED
+            self._model, self._data, self._frame(frame)[0], _WORLD_ALIGNED
         ).vector
 
-    def _frame(self, name: str) -> int:
-        index = self._frames.get(name)
-        if index is None:
-            index = self._frames[name] = self._model.getFrameId(name)
-        return index
+    def _frame(self, name: str) -> tuple[int, Array, Array]:
+        """Return a frame's number and the views of its placement."""
+        found = self._frames.get(name)
+        if found is None:
+            index = self._model.getFrameId(name)
+            placement = self._data.oMf[index]
+            found = self._frames[name] = index, placement.rotation, placement.translation
+        return found
+
+
+def _stacked(parts: Sequence[Array]) -> Array:
+    """Return one live view (N, …) of arrays that lie in memory at equal distances."""
+    starts = np.array([part.__array_interface__["data"][0] for part in parts])
+    step = int(starts[1] - starts[0])
+    if (np.diff(starts) != step).any():
+        raise RuntimeError("Pinocchio does not keep its joints' terms side by side.")
+    first = parts[0]
+    return np.lib.stride_tricks.as_strided(
+        first, (len(parts), *first.shape), (step, *first.strides)
+    )

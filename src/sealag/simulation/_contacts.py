@@ -6,7 +6,6 @@ import numpy as np
 
 from sealag.errors import InputError
 from sealag.robot import Robot
-from sealag.simulation._body import Body
 from sealag.simulation._ground import Foot, Ground, contact_frame
 from sealag.simulation._instant import Instant
 from sealag.simulation._outcome import Outcome, PlantStop
@@ -45,36 +44,40 @@ class Contacts:
 
         self._kernel, self._friction = contact, friction
         self.feet, self.ground, self.rates = tuple(feet), ground, (stabilisation, stop_time)
-        frames = [foot.contact.frame for foot in feet]
-        self.body = Body(robot, [*frames, *loaded_frames])
-        self.all_frames = list(range(len(frames) + len(loaded_frames)))
+        frames = [*(foot.contact.frame for foot in feet), *loaded_frames]
         offsets = [foot.offsets() for foot in feet]
         self.foot_of = np.repeat(np.arange(len(feet)), [len(o) for o in offsets]).astype(np.int64)
         self.count = self.foot_of.size
         self.total = self.count + len(loaded_frames)
         loaded = len(feet) + np.arange(len(loaded_frames))
-        self.shape = (
-            np.concatenate([self.foot_of, loaded]).astype(np.int64),
-            np.concatenate([*offsets, np.zeros((len(loaded_frames), 3))]),
-        )
-        owners = [self.feet[f] for f in self.foot_of.tolist()]
+        frame_of = np.concatenate([self.foot_of, loaded]).astype(np.int64)
+        offset = np.concatenate([*offsets, np.zeros((len(loaded_frames), 3))])
+        self.load = np.zeros((len(loaded_frames), 3))
+        self._owner = self.foot_of.tolist()
+        owners = [self.feet[f] for f in self._owner]
         self.C = np.tile(np.eye(3), (self.count, 1, 1))
         self.anchor = np.zeros((self.count, 3))
         self.mu = np.array([foot.friction for foot in owners], dtype=float)
         self.ridge = np.where(np.bincount(self.foot_of)[self.foot_of] > 1, _SOLE, _POINT)
-        self.ground_arrays = (self.C, self.anchor, self.mu, self.ridge)
         self.closed = np.zeros(self.count, np.int64)
         self.yielding = np.zeros(self.count)
         self.state = (self.closed, self.yielding)
         self.torsion = np.zeros((len(feet), 2))
         for f, foot in enumerate(feet):
             self.torsion[f] = foot.torsional_damping, foot.torsional_radius
+        self.around = (
+            *robot.frame_mounts(frames), frame_of, offset, self.C, self.anchor, self.mu, self.ridge,
+            self.torsion, self.load,
+        )  # fmt: skip
+        self.sizes = (
+            robot.nq, robot.nv, robot.n, self.count, self.total, len(feet), len(frames),
+        )  # fmt: skip
         self._weight = robot.mass * 9.81
         self._radius = np.array([foot.radius for foot in owners], dtype=float)
         # How far below the ground a point may be that opened but has not risen: several points of
         # one sole share its load, and those without any must not strike again and again.
         self._floor = np.zeros(self.count)
-        self._margins, self._before = np.zeros(self.count), np.zeros(self.count)
+        self._before = np.zeros(self.count)
 
     def open_all(self) -> None:
         """Open every contact."""
@@ -89,11 +92,6 @@ class Contacts:
     def recall(self) -> None:
         """Return to the sliding state of the step's beginning."""
         self.yielding[:] = self._before
-
-    @property
-    def mode(self) -> IntArray:
-        """0 where open, 1 where sticking, 2 where sliding (P,)."""
-        return self.closed * (1 + (self.yielding > 0.0))
 
     def height(self, at: Instant, point: int) -> float:
         """Return the height (m) of a point's sole above the ground below it."""
@@ -115,8 +113,8 @@ class Contacts:
 
     def measure_gaps(self, at: Instant) -> None:
         """Measure the gaps of all open points."""
-        for point in range(self.count):
-            if self.closed[point]:
+        for point, closed in enumerate(self.closed.tolist()):
+            if closed:
                 at.gap[point] = np.inf
                 continue
             height = self.height(at, point)
@@ -138,11 +136,9 @@ class Contacts:
         """Return the smallest margin (m, body weights) and its point; below 0 it must change."""
         if self.count == 0:
             return np.inf, -1
-        self._kernel.margins(
-            self.C, at.velocity, at.force, at.gap, self.closed, self._weight, self._margins
+        return self._kernel.smallest_margin(
+            self.C, at.velocity, at.force, at.gap, self.closed, self._weight
         )
-        worst = int(self._margins.argmin())
-        return float(self._margins[worst]), worst
 
     def touching(self, at: Instant, *, tolerance: float = _NEAR) -> IntArray:
         """Return 1 for every point that is closed or could close now (P,)."""
@@ -165,16 +161,12 @@ class Contacts:
         self.closed[point] = 1
         self.yielding[point] = 0.0
 
-    def loaded_frames(self) -> list[int]:
-        """Return the numbers of the frames on which forces may act now."""
-        feet = dict.fromkeys(self.foot_of[self.closed == 1].tolist())
-        return [*feet, *self.all_frames[len(self.feet) :]]
-
-    def loaded(self) -> Array:
-        """Return 1.0 for every foot that has a closed point (F,)."""
-        flags = np.zeros(len(self.feet))
-        flags[self.foot_of[self.closed == 1]] = 1.0
-        return flags
+    def loaded(self, out: Array) -> None:
+        """Write 1.0 for every foot that has a closed point, else 0.0 (F,)."""
+        out[:] = 0.0
+        for foot, closed in zip(self._owner, self.closed.tolist()):
+            if closed:
+                out[foot] = 1.0
 
     def strike(self, at: Instant, mask: IntArray) -> tuple[Array, Array]:
         """Solve the plastic impact of the touching points; return velocity and impulses.
@@ -182,7 +174,7 @@ class Contacts:
         Points that rebound are open afterwards; tangential impulses obey the friction cone.
         """
         speed, impulse = np.zeros_like(at.v), np.zeros((self.count, 3))
-        self._kernel.project(at.L, at.J, self.C, at.rows)
+        self._kernel.project(at.L, at.J, self.C, mask, at.rows)
         yielding = np.zeros(self.count)
         none = np.zeros((self.count, 3))
         spinless = np.zeros(len(self.feet))
@@ -194,7 +186,7 @@ class Contacts:
         self._kernel.demand(
             self.C, at.position, self.anchor, at.velocity, at.drift, *self.rates, at.target
         )
-        self._kernel.project(at.L, at.J, self.C, at.rows)
+        self._kernel.project(at.L, at.J, self.C, mask, at.rows)
         free, x, force = np.linalg.solve(at.L, at.right), np.zeros_like(at.v), at.force.copy()
         self._settle(at, free, at.target, mask, self.yielding, at.spin, x, force)
 

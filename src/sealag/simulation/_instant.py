@@ -1,51 +1,70 @@
-"""Preallocated storage for everything the plant knows about one instant."""
+"""Preallocated memory for everything the plant knows about one instant."""
 
 import numpy as np
 
-from sealag.robot import Robot
+from sealag.typing import Array
 
 
 class Instant:
-    """One instant's state, dynamics terms, contact forces and powers; overwritten in place.
+    """One instant's state, contact forces and powers; overwritten in place.
 
     Attributes:
+        data: All of it in one row, as the kernels take it; the other arrays are views.
+        row: The part of it that is logged, from q to force.
         q: Configuration (nq,).
         v: Velocity (nv,).
         z: Joint vectors (n, 9) of the motor kernels: angle, speed and torque first.
-        M: Mass matrix (nv, nv).
-        nle: Coriolis and gravity terms (nv,).
-        potential: Gravity potential, J.
-        tau: Spring torques (n,), Nm.
         acceleration: v̇ (nv,).
-        force: Contact forces in their contact frames (P, 3), N.
-        position: Contact points, then loaded points, in the world (P + L, 3), m.
-        velocity: Their velocities (P + L, 3), m/s.
-        gap: Height of each contact point above the ground (P,), m; inf while it is loaded.
         power: Powers of holding, sliding, torsional and disturbing forces, W; kinetic energy, J.
-        solved: The arrays that the contact kernel writes, in its order.
+        tau: Spring torques (n,), Nm.
+        force: Contact forces in their contact frames (P, 3), N.
+        gap: Height of each contact point above the ground (P,), m; inf while it is loaded.
+        position: Contact points, then loaded points, in the world (T, 3), m.
+        velocity: Their velocities (T, 3), m/s.
+        drift: Their accelerations at zero v̇ (T, 3), m/s².
+        J: Their Jacobians (T, 3, nv).
+        target: What the contact equations ask for besides J v̇ (P, 3).
+        rows: L⁻¹ (C J)ᵀ of the contact points (P, 3, nv).
+        right: Applied generalised forces less Coriolis and gravity (nv,).
+        L: Cholesky factor of the mass matrix (nv, nv).
+        twist_rows: L⁻¹ Jᵀ of each foot's turn about its normal (feet, nv).
+        spin: The rate of that turn (feet,), rad/s.
+        potential: Gravity potential, J.
+        sizes: As in ``contact.parts``.
     """
 
     __slots__ = (
-        "J", "L", "M", "acceleration", "drift", "force", "gap", "nle", "position", "potential",
-        "power", "q", "right", "rows", "solved", "spin", "target", "tau", "twist_rows", "v",
+        "J", "L", "acceleration", "data", "drift", "force", "gap", "position", "potential",
+        "power", "q", "right", "row", "rows", "sizes", "spin", "target", "tau", "twist_rows", "v",
         "velocity", "z",
     )  # fmt: skip
 
-    def __init__(self, robot: Robot, *, points: int, contacts: int, feet: int) -> None:
-        n, nv = robot.n, robot.nv
-        self.q, self.v, self.z = np.zeros(robot.nq), np.zeros(nv), np.zeros((n, 9))
-        self.M, self.nle, self.potential = np.zeros((nv, nv)), np.zeros(nv), 0.0
-        self.tau, self.acceleration = np.zeros(n), np.zeros(nv)
-        self.force, self.target = np.zeros((contacts, 3)), np.zeros((contacts, 3))
-        self.position, self.velocity = np.zeros((points, 3)), np.zeros((points, 3))
-        self.gap, self.power = np.full(contacts, np.inf), np.zeros(5)
-        self.right, self.L = np.zeros(nv), np.zeros((nv, nv))
-        self.rows, self.J = np.zeros((contacts, 3, nv)), np.zeros((points, 3, nv))
-        self.drift, self.twist_rows, self.spin = (
-            np.zeros((points, 3)), np.zeros((feet, nv)), np.zeros(feet)
-        )  # fmt: skip
-        self.solved = (
-            self.tau, self.acceleration, self.force, self.position, self.velocity, self.target,
-            self.right, self.L, self.rows, self.power, self.J, self.drift, self.twist_rows,
-            self.spin,
-        )  # fmt: skip
+    def __init__(self, sizes: tuple[int, int, int, int, int, int, int]) -> None:
+        from sealag.kernels import contact
+
+        nq, nv, n, count = sizes[:4]
+        self.sizes = sizes
+        self.data = np.zeros(contact.memory_size(sizes))
+        self.row = self.data[: nq + 2 * nv + 10 * n + 5 + 3 * count]
+        self.potential = 0.0
+        (
+            self.q, self.v, self.z, self.acceleration, self.power, self.tau, self.force, self.gap,
+            self.position, self.velocity, self.drift, self.J, self.target, self.rows, self.right,
+            self.L, self.twist_rows, self.spin, *_,
+        ) = contact.parts(self.data, sizes)  # fmt: skip
+        self.gap[:] = np.inf
+
+    def split(self, rows: Array) -> dict[str, Array]:
+        """Return the named parts of logged rows (N, …).
+
+        Args:
+            rows: As ``row``, below one another.
+        """
+        nq, nv, n, count = self.sizes[:4]
+        ends = np.cumsum([nq, nv, 9 * n, nv + 5, n])
+        q, v, z, _, tau, force = (part.copy() for part in np.split(rows, ends, axis=1))
+        angle, speed, torque = (z[:, k::9].copy() for k in range(3))
+        return {
+            "q": q, "v": v, "theta": angle, "theta_dot": speed, "tau_motor": torque,
+            "tau_sea": tau, "contact_force": force.reshape(len(rows), count, 3),
+        }  # fmt: skip

@@ -23,6 +23,7 @@ class Ledger:
     """Cumulative works since the beginning of a run, J.
 
     Attributes:
+        data: All of it in one row: joint, scalar, stores, throughput (8 n + 10,).
         joint: Rows as in JOINT_FLOWS (8, n).
         scalar: As in SCALAR_FLOWS (5,); the first four are works done on the robot, impact is lost.
         stores: Energies at the present instant as in STORES (4,).
@@ -34,9 +35,11 @@ class Ledger:
 
         self._tally, self._stores, self._parameters = tally, stores, parameters
         n = parameters.shape[0]
-        self.joint, self.scalar = np.zeros((len(JOINT_FLOWS), n)), np.zeros(len(SCALAR_FLOWS))
-        self.stores = np.zeros(4)
-        self._moved = np.zeros(1)
+        self.data = np.zeros(sum(ledger_sizes(n)))
+        joint, self.scalar, self.stores, self._moved = np.split(
+            self.data, np.cumsum(ledger_sizes(n))[:-1]
+        )
+        self.joint = joint.reshape(len(JOINT_FLOWS), n)
 
     @property
     def throughput(self) -> float:
@@ -45,9 +48,7 @@ class Ledger:
 
     def begin(self, at: Instant) -> None:
         """Open empty books at an instant."""
-        self.joint[:] = 0.0
-        self.scalar[:] = 0.0
-        self._moved[:] = 0.0
+        self.data[:] = 0.0
         self._stores(self._parameters, at.z, at.q, at.power[4], at.potential, self.stores)
 
     def add(self, work: Array, powers: Array, step: float, at: Instant) -> None:
@@ -63,6 +64,11 @@ class Ledger:
         before = self.stores.copy()
         self._stores(self._parameters, at.z, at.q, at.power[4], at.potential, self.stores)
         self._moved += np.abs(self.stores - before).sum()
+
+
+def ledger_sizes(n: int) -> tuple[int, int, int, int]:
+    """Return the lengths of joint works, other works, stores and throughput for n joints."""
+    return len(JOINT_FLOWS) * n, len(SCALAR_FLOWS), len(STORES), 1
 
 
 def residual(stores: Array, joint: Array, scalar: Array) -> Array:

@@ -10,7 +10,7 @@ from sealag.delay import DelayLine
 from sealag.errors import InputError, SealagError
 from sealag.robot import Robot
 from sealag.simulation._audit import audit
-from sealag.simulation._ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
+from sealag.simulation._ledger import JOINT_FLOWS, ledger_sizes
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.simulation._plant import FASTEST, Plant
@@ -237,7 +237,7 @@ class _Loop:
             self._up.receive(t, self.received.data)
             self.controller.tick(t, self.received, self.command[1:])
             self.command[0] = t
-            if not math.isfinite(self.command.sum()):
+            if not math.isfinite(sum(self.command.tolist())):
                 raise PlantStop(
                     Outcome.CONTROLLER_FAILED, f"the command at t = {t:.4f} s is not finite"
                 )
@@ -258,7 +258,7 @@ class _Loop:
         truth.theta[:] = plant.theta
         truth.theta_dot[:] = plant.theta_dot
         truth.tau_sea[:] = plant.tau_sea
-        truth.contact[:] = plant.contacts.loaded()
+        plant.contacts.loaded(truth.contact)
 
     def _watch(self) -> None:
         """End the run when the robot has fallen or left any physical range."""
@@ -292,59 +292,56 @@ class _Loop:
 
     # Storage -----------------------------------------------------------------------------------
     def _allocate(self, rows: int) -> Log:
-        robot, count = self.robot, self.plant.contacts.count
-        n = robot.n
-        joint = ("theta", "theta_dot", "tau_sea", "tau_motor", "tau_command", "tau_osc")
-        widths = {"time": 1, "q": robot.nq, "v": robot.nv, **dict.fromkeys(joint, n)}
-        widths |= {"measurement_age": 1, "command_age": 1, "mode": count, "force": 3 * count}
-        widths |= {"stores": len(STORES), "joint": len(JOINT_FLOWS) * n}
-        widths |= {"scalar": len(SCALAR_FLOWS), "throughput": 1, "storage": 1}
-        return Log(rows, widths)
+        n, plant = self.robot.n, self.plant
+        widths = {"time": 1, "instant": plant.instant.row.size, "tau_command": n, "tau_osc": n}
+        widths |= {"measurement_age": 1, "command_age": 1, "storage": 1}
+        widths |= dict.fromkeys(("closed", "yielding"), plant.contacts.count)
+        return Log(rows, widths | {"ledger": plant.ledger.data.size})
 
     def _record(self, log: Log) -> None:
-        plant, ledger, t = self.plant, self.plant.ledger, self.plant.time
-        storage = 0.0
+        plant, t, storage = self.plant, self.plant.time, 0.0
         if self._storing is not None:
             self._sense(t)
             storage = self._storing.storage(t, self.truth)
+        closed, yielding = plant.contacts.state
         log.row(
-            t, plant.q, plant.v, plant.theta, plant.theta_dot, plant.tau_sea,
-            plant.motor_torque, self.command[1:], self.acting[1:],
-            self.command[0] - self.received.data[0], t - self.acting[0],
-            plant.contacts.mode, plant.force.ravel(), ledger.stores, ledger.joint.ravel(),
-            ledger.scalar, ledger.throughput, storage,
+            t, plant.instant.row, self.command[1:], self.acting[1:],
+            float(self.command[0] - self.received.data[0]), t - float(self.acting[0]), storage,
+            closed, yielding, plant.ledger.data,
         )  # fmt: skip
 
     def _result(self, log: Log, outcome: Outcome, message: str) -> Run:
-        robot, contacts = self.robot, self.plant.contacts
-        n, count = robot.n, contacts.count
-        time = log.column("time")
-        actuators = self.plant.actuators
-        names = ("theta", "theta_dot", "tau_sea", "tau_motor", "tau_command", "tau_osc")
+        robot, contacts, actuators = self.robot, self.plant.contacts, self.plant.actuators
+        n, time, joints = robot.n, log.column("time"), tuple(robot.joints)
+        state = self.plant.instant.split(log.column("instant", self.plant.instant.row.size))
+        works, scalar, stores, moved = np.split(
+            log.column("ledger", sum(ledger_sizes(n))), np.cumsum(ledger_sizes(n))[:-1], axis=1
+        )
+        closed = log.column("closed", contacts.count)
+        sliding = log.column("yielding", contacts.count) > 0.0
         return Run(
             outcome=outcome,
             message=message,
             seed=self.seed,
-            joints=tuple(robot.joints),
+            joints=joints,
             feet=tuple(contacts.feet[f].contact.frame for f in contacts.foot_of),
             time=time,
-            q=log.column("q", robot.nq),
-            v=log.column("v", robot.nv),
-            **{name: log.column(name, n) for name in names},
+            **state,
+            tau_command=log.column("tau_command", n),
+            tau_osc=log.column("tau_osc", n),
             measurement_age=log.column("measurement_age"),
             command_age=log.column("command_age"),
-            contact_mode=log.column("mode", count).astype(np.int64),
-            contact_force=log.column("force", count, 3),
+            contact_mode=(closed * (1 + sliding)).astype(np.int64),
             events=tuple(self.plant.events),
             audit=audit(
                 time=time,
-                joints=tuple(robot.joints),
-                stores=log.column("stores", len(STORES)),
-                joint=log.column("joint", len(JOINT_FLOWS), n),
-                scalar=log.column("scalar", len(SCALAR_FLOWS)),
-                throughput=log.column("throughput"),
+                joints=joints,
+                stores=stores,
+                joint=works.reshape(-1, len(JOINT_FLOWS), n),
+                scalar=scalar,
+                throughput=moved[:, 0],
                 storage=log.column("storage") if self._storing is not None else None,
-                shaped=0.5 * log.column("theta_dot", n) ** 2 @ actuators.shaped_inertia,
+                shaped=0.5 * state["theta_dot"] ** 2 @ actuators.shaped_inertia,
                 ratio=actuators.rotor_inertia / actuators.shaped_inertia,
             ),
         )

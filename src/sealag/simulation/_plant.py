@@ -77,7 +77,7 @@ class Plant:
         delayed_torque_feedback: bool = False,
         stabilisation: float = 50.0,
     ) -> None:
-        from sealag.kernels import contact, motor, rigid
+        from sealag.kernels import contact, motor, plant
 
         if not (np.isfinite(step) and step > 0):
             raise InputError(f"the step must be a time > 0 s, got {step}")
@@ -86,20 +86,16 @@ class Plant:
                 f"actuators are for joints {list(actuators.joints)}, "
                 f"the robot has {list(robot.joints)}"
             )
-        self._rigid, self._motor, self._contact_kernel = rigid, motor, contact
+        self._kernel, self._evaluate_contact = plant, contact.evaluate
         self.robot, self.actuators, self.step_length = robot, actuators, step
         self.contacts = Contacts(
             robot, feet, ground or FlatGround(), loaded_frames, stabilisation=stabilisation,
             stop_time=step,
         )  # fmt: skip
-        n, nv, count = robot.n, robot.nv, self.contacts.count
+        n, nv, self._sizes = robot.n, robot.nv, self.contacts.sizes
         self.time = 0.0
-        self._base = robot.nv_base
+        self._workspace = robot.workspace()
         self._parameters = actuator_parameters(actuators)
-        self._spring = (
-            np.ascontiguousarray(self._parameters[:, 0]),
-            np.ascontiguousarray(self._parameters[:, 1]),
-        )
         self._instant = 0.0 if delayed_torque_feedback else 1.0
         self._tables = (
             np.empty((n, 4, 9, 9)),
@@ -107,18 +103,15 @@ class Plant:
             np.empty((n, 4, 5, 9, 9)),
         )
         motor.tables(self._parameters, self._instant, step, *self._tables)
-        self._now, self._next, self._stage = (
-            Instant(robot, points=self.contacts.total, contacts=count, feet=len(feet))
-            for _ in range(3)
-        )
-        self._rates, self._accelerations = np.zeros((4, nv)), np.zeros((4, nv))
-        self._powers = np.zeros((4, 5))
-        self._ahead, self._u = np.zeros((n, 2, 2)), np.zeros(nv)
-        self._middle, self._end = self._ahead[:, 0].copy(), self._ahead[:, 1].copy()
-        self._work = np.zeros((n, 7))
-        self.load = np.zeros((len(loaded_frames), 3))
+        self._now, self._next, self._stage = (Instant(self._sizes) for _ in range(3))
+        self._powers, self._work = np.zeros((4, 5)), np.zeros((n, 7))
+        self._memory = (
+            np.zeros((4, nv)), np.zeros((4, nv)), self._powers, np.zeros((n, 2, 2)), np.zeros(nv),
+            self._work,
+        )  # fmt: skip
+        self.load = self.contacts.load
         self.ledger = Ledger(self._parameters)
-        self.impulse = np.zeros((count, 3))
+        self.impulse = np.zeros((self.contacts.count, 3))
         self.events: list[ContactEvent] = []
 
     # State -------------------------------------------------------------------------------------
@@ -146,7 +139,7 @@ class Plant:
         self.events.clear()
         self.contacts.open_all()
         self._evaluate(now)
-        self._refuse_stiffness(now.M)
+        self._refuse_stiffness(self._workspace.M)
         self.contacts.refuse_buried(now)
         self.contacts.measure_gaps(now)
         try:
@@ -157,7 +150,7 @@ class Plant:
 
     def _refuse_stiffness(self, M: Array) -> None:
         n = self.robot.n
-        root = np.sqrt(self._spring[0])
+        root = np.sqrt(self._parameters[:, 0])
         mobility = np.linalg.inv(M)[-n:, -n:]
         squares, modes = np.linalg.eigh(root[:, None] * mobility * root)
         fastest = float(np.sqrt(squares[-1]))
@@ -227,13 +220,13 @@ class Plant:
             self._try(left, regular, tau_osc, measured)
             margin, point = self.contacts.margin(self._next)
             if margin >= -MARGIN:
-                self._accept(left)
+                self._accept(left, regular, tau_osc, measured)
                 return
             done, point = self._locate(left, margin, point, tau_osc, measured)
-            self._accept(done)
+            regular = False
+            self._accept(done, regular, tau_osc, measured)
             self._change(point)
             left -= done
-            regular = False
             if left <= 1e-9 * self.step_length:
                 return
         raise PlantStop(
@@ -244,53 +237,36 @@ class Plant:
 
     def _try(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
         """Fill the next instant with the state one step ahead in the present contact modes."""
-        rigid, now, nxt, stage = self._rigid, self._now, self._next, self._stage
-        base, n = self._base, self.robot.n
-        z = nxt.z
-        z[:] = now.z
-        z[:, 3], z[:, 4] = now.q[-n:], now.v[-n:]
-        z[:, 5], z[:, 6] = now.acceleration[-n:], 0.0
-        self._motor.predict(
-            self._parameters, self._instant, tau_osc, measured, z, step, self._tables[0],
-            regular, self._ahead,
-        )  # fmt: skip
-        self._middle[:], self._end[:] = self._ahead[:, 0], self._ahead[:, 1]
-        self._rates[0], self._accelerations[0] = now.v, now.acceleration
-        self._powers[0] = now.power
-        used = self.contacts.loaded_frames()
-        for k in (1, 2, 3):
-            rigid.stage(
-                now.q, now.v, self._rates[k - 1], self._accelerations[k - 1],
-                step if k == 3 else 0.5 * step, base, self._u, stage.q, stage.v, self._rates[k],
-            )  # fmt: skip
-            self._evaluate(stage, self._end if k == 3 else self._middle, used)
-            self._accelerations[k] = stage.acceleration
-            self._powers[k] = stage.power
-        rigid.combine(now.q, now.v, self._rates, self._accelerations, step, base, nxt.q, nxt.v)
-        self._motor.link_cubic(z, now.q[-n:], now.v[-n:], nxt.q[-n:], nxt.v[-n:], step)
-        self._work[:] = 0.0
-        self._motor.move(
-            self._parameters, self._instant, tau_osc, measured, z, step, self._tables[1],
-            self._tables[2], regular, self._work,
-        )  # fmt: skip
-        self._evaluate(nxt)
-        if not math.isfinite(nxt.power[4]):
+        following, motors = self._next, self._motors(tau_osc, measured)
+        for k in (0, 1, 2):
+            self._advance(k, motors, step, regular, False)
+            self._evaluate(self._stage)
+        self._advance(3, motors, step, regular, regular)
+        self._evaluate(following)
+        if not math.isfinite(following.power[4]):
             raise PlantStop(
                 Outcome.DIVERGED, f"velocities are not finite after t = {self.time:.4f} s"
             )
-        self.contacts.measure_gaps(nxt)
+        self.contacts.measure_gaps(following)
 
-    def _evaluate(
-        self, at: Instant, motor: Array | None = None, used: list[int] | None = None
-    ) -> None:
-        """Evaluate an instant; a stage brings its motor state and the frames that carry load."""
-        contacts = self.contacts
-        contacts.body.evaluate(at, contacts.all_frames if used is None else used)
-        solved = self._contact_kernel.evaluate(
-            at.M, at.nle, contacts.body.frames, at.v, at.q[-self.robot.n :],
-            at.z if motor is None else motor, self._spring, contacts.shape,
-            contacts.ground_arrays, contacts.rates, contacts.state, self.load,
-            contacts.torsion, at.solved,
+    def _motors(self, tau_osc: Array, measured: Array) -> tuple:
+        half, whole, forms = self._tables
+        return self._parameters, self._instant, tau_osc, measured, half, whole, forms
+
+    def _advance(self, k: int, motors: tuple, step: float, regular: bool, book: bool) -> None:
+        self._kernel.advance(
+            k, self._now.data, self._stage.data, self._next.data, self._sizes, self._memory,
+            motors, step, regular, book,
+        )  # fmt: skip
+
+    def _evaluate(self, at: Instant) -> None:
+        """Evaluate an instant's dynamics and contact forces at its q, v and z."""
+        workspace, contacts = self._workspace, self.contacts
+        workspace.update(at.q, at.v)
+        at.potential = workspace.potential_energy
+        solved = self._evaluate_contact(
+            workspace.terms, contacts.around, contacts.state, contacts.rates, self._parameters,
+            at.data, self._sizes,
         )  # fmt: skip
         if not solved:
             tame = float(np.abs(at.v).max()) < FASTEST
@@ -299,7 +275,10 @@ class Plant:
                 f"the equations of motion have no solution after t = {self.time:.4f} s",
             )
 
-    def _accept(self, step: float) -> None:
+    def _accept(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
+        """Take the next instant for the present one, and book the step."""
+        if not regular:
+            self._advance(3, self._motors(tau_osc, measured), step, regular, True)
         self._now, self._next = self._next, self._now
         self.ledger.add(self._work, self._powers, step, self._now)
         self.time += step
