@@ -11,6 +11,7 @@ from sealag.kernels.operational_space import (
     PUBLISHED,
     SYMMETRIC,
     allocate,
+    invert_low_rank,
     operational_space,
     task_torque,
 )
@@ -133,3 +134,57 @@ def test_cholesky_inverse_and_its_refusal():
     assert invert_spd(A, out, np.zeros((5, 5)))
     np.testing.assert_allclose(out @ A, np.eye(5), atol=1e-12)
     assert not invert_spd(-A, out, np.zeros((5, 5)))
+
+
+def low_rank_scratch(n):
+    return np.zeros((n, n)), np.zeros((5, n, n)), np.zeros(n)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-12])
+@pytest.mark.parametrize("rank", [0, 1, 4, 6, 9])
+def test_low_rank_inverse_without_eigenvalues_is_theirs_or_says_that_it_is_not(rank, noise):
+    rng = np.random.default_rng(rank)
+    Q = np.linalg.qr(rng.normal(size=(9, 9)))[0][:, :rank]
+    A = Q @ np.diag(np.geomspace(1.0, 100.0, rank)) @ Q.T
+    E = rng.normal(size=(9, 9))
+    noisy = A + noise * np.abs(A).max(initial=1.0) * (E + E.T)
+    out, scratch, values = low_rank_scratch(9)
+    kept = noisy.copy()
+    found = invert_low_rank(noisy, 1e-9 * max(1.0, np.trace(A)), out, scratch, values)
+    np.testing.assert_array_equal(noisy, kept)
+    assert found in (rank, -1)
+    if found >= 0:
+        expected = np.linalg.pinv(A, rcond=1e-8, hermitian=True)
+        np.testing.assert_allclose(out, expected, atol=1e-8)
+    assert found == rank or noise == 1e-12 or rank == 0
+
+
+@pytest.mark.parametrize("smallest", [1e-2, 1e-7, 3e-9, 3e-10, 1e-12])
+def test_low_rank_inverse_leaves_doubtful_ranks_to_eigenvalues(smallest):
+    """An eigenvalue near the threshold, on either side of it, is not for a factorisation."""
+    rng = np.random.default_rng(3)
+    Q = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+    A = Q @ np.diag([1.0, 2.0, 3.0, 4.0, smallest, 0.0]) @ Q.T
+    out, scratch, values = low_rank_scratch(6)
+    found = invert_low_rank(A, 1e-9, out, scratch, values)
+    assert found == (5 if smallest == 1e-2 else -1)
+
+
+def test_noise_in_a_lost_direction_falls_back_on_eigenvalues():
+    """Contacts written three times leave rounding that a factorisation would take for motion."""
+    rng = np.random.default_rng(11)
+    nv, n = 18, 12
+    X = rng.normal(size=(nv, nv))
+    M = X @ X.T + np.eye(nv)
+    once = rng.normal(size=(12, nv))
+    J_s = np.vstack([once, once + 1e-13 * rng.normal(size=once.shape), once])
+    J_t, g, K_x = rng.normal(size=(6, nv)), rng.normal(size=nv), np.eye(6)
+    space = allocate(nv, n, len(J_s), m=6)
+    levels = np.array([0, 6])
+    assert operational_space(M, g, J_s, J_t, K_x, levels, FORCE, False, TOLERANCE, space)
+    J_star, _, UN_bar, gravity = plain_space(
+        M, g, J_s, J_t, K_x, levels=[0, 6], form=FORCE, n=n, star=False
+    )
+    np.testing.assert_allclose(space.J_star, J_star, atol=1e-8 * np.abs(J_star).max())
+    np.testing.assert_allclose(space.joint_from_base, UN_bar, atol=1e-8 * np.abs(UN_bar).max())
+    np.testing.assert_allclose(space.gravity, gravity, atol=1e-8 * np.abs(gravity).max())

@@ -9,6 +9,8 @@ from sealag.kernels.dense import invert_spd, multiply, multiply_transposed, pseu
 from sealag.typing import Array
 
 SYMMETRIC, PUBLISHED, FORCE = 0, 1, 2
+_ROUNDING = 1e-13  # of the trace: what a Cholesky factorisation leaves
+_WORST_CONDITION = 1e4  # up to which A⁺ through G⁻² loses no more than six digits
 
 
 class Space(NamedTuple):
@@ -21,15 +23,16 @@ class Space(NamedTuple):
     Lambda: Array  # (m, m), blocks of the levels on the diagonal
     stiffness: Array  # (m, m), likewise
     joint_from_base: Array  # (nv, n): dynamically consistent inverse of U N_s
+    lift: Array  # (m, nv): rows of Λ_k J_k P_k, the motion that one unit of a task's error means
     gravity: Array  # (n,) compensation torque
     M_inverse: Array  # (nv, nv)
     P: Array  # (nv, nv)
     square_v: Array  # (nv, nv)
-    square_n: Array  # (4, n, n)
-    square_c: Array  # (4, c, c)
+    square_n: Array  # (8, n, n)
+    square_c: Array  # (7, c, c)
     square_m: Array  # (5, m, m)
     wide_c: Array  # (2, c, nv)
-    wide_m: Array  # (2, m, nv)
+    wide_m: Array  # (m, nv)
     tall_n: Array  # (nv, n)
     values: Array  # (max(n, c, m),)
 
@@ -48,18 +51,99 @@ def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
         Lambda=np.zeros((m, m)),
         stiffness=np.zeros((m, m)),
         joint_from_base=np.zeros((nv, n)),
+        lift=np.zeros((m, nv)),
         gravity=np.zeros(n),
         M_inverse=np.zeros((nv, nv)),
         P=np.zeros((nv, nv)),
         square_v=np.zeros((nv, nv)),
-        square_n=np.zeros((4, n, n)),
-        square_c=np.zeros((4, c, c)),
+        square_n=np.zeros((8, n, n)),
+        square_c=np.zeros((7, c, c)),
         square_m=np.zeros((5, m, m)),
         wide_c=np.zeros((2, c, nv)),
-        wide_m=np.zeros((2, m, nv)),
+        wide_m=np.zeros((m, nv)),
         tall_n=np.zeros((nv, n)),
         values=np.zeros(max(n, c, m, 1)),
     )
+
+
+@njit(cache=True)
+def _factor(A, L, left):
+    """A = L Lᵀ by Cholesky with pivots, rows of Lᵀ (r, n) in ``L``; r, and the trace of A.
+
+    It ends where what is left of every diagonal entry is rounding.
+    """
+    n = A.shape[0]
+    trace = 0.0
+    for i in range(n):
+        left[i] = A[i, i]
+        trace += A[i, i]
+    for r in range(n):
+        p = 0
+        for i in range(1, n):
+            if left[i] > left[p]:
+                p = i
+        if not left[p] > _ROUNDING * trace:
+            return r, trace
+        L[r] = A[p]
+        for k in range(r):
+            factor = L[k, p]
+            for i in range(n):
+                L[r, i] -= factor * L[k, i]
+        scale = 1.0 / np.sqrt(left[p])
+        for i in range(n):
+            L[r, i] *= scale
+            left[i] -= L[r, i] * L[r, i]
+        left[p] = 0.0
+    return n, trace
+
+
+@njit(cache=True)
+def invert_low_rank(A, threshold, out, scratch, values):
+    """out = A⁺ of a symmetric positive semidefinite A (n, n), if that is safe without eigenvalues.
+
+    A = L Lᵀ by Cholesky with pivots, L (n, r), and A⁺ = L G⁻² Lᵀ with G = Lᵀ L, whose eigenvalues
+    are those of A that are not 0.
+
+    Args:
+        A: (n, n), kept.
+        threshold: eigenvalues up to this count as zero.
+        out: (n, n), written.
+        scratch: (5, n, n).
+        values: (≥ n,) scratch.
+
+    Returns:
+        The rank; -1 if eigenvalues must decide what it is, because one may lie near the threshold
+        or A is too badly conditioned. It is given only where it is certain: what is left of the
+        trace is rounding, and λ_r ≥ 1 / trace G⁻¹ is above the threshold.
+    """
+    n = A.shape[0]
+    r, trace = _factor(A, scratch[0], values)
+    L, W = scratch[0][:r], scratch[1][:r]
+    G = scratch[2].ravel()[: r * r].reshape(r, r)
+    G_inverse = scratch[3].ravel()[: r * r].reshape(r, r)
+    multiply_transposed(L, L, G)
+    if not invert_spd(G, G_inverse, scratch[4].ravel()[: r * r].reshape(r, r)):
+        return -1
+    weakest = 0.0
+    for i in range(r):
+        weakest += G_inverse[i, i]
+    if weakest * max(threshold, trace / _WORST_CONDITION) >= 1.0:
+        return -1
+    multiply(G_inverse, L, W)
+    out[:, :] = 0.0
+    for k in range(r):
+        for i in range(n):
+            factor = W[k, i]
+            for j in range(n):
+                out[i, j] += factor * W[k, j]
+    return r
+
+
+@njit(cache=True)
+def _pseudo_inverse(A, threshold, out, scratch, values):
+    """out = A⁺; eigenvalues only where `invert_low_rank` gives no answer. A is overwritten."""
+    if invert_low_rank(A, threshold, out, scratch, values) < 0:
+        pseudo_inverse_psd(A, threshold, out, scratch[0], values, scratch[1])
 
 
 @njit(cache=True)
@@ -85,16 +169,11 @@ def _constrain(M, J_s, tolerance, space):
     if J_s.shape[0] == 0:
         return True
     X, scratch = space.wide_c[0], space.wide_c[1]
-    A, A_inverse, root, vectors = (
-        space.square_c[0],
-        space.square_c[1],
-        space.square_c[2],
-        space.square_c[3],
-    )
+    A, A_inverse = space.square_c[0], space.square_c[1]
     multiply(J_s, P, X)
     multiply_transposed(X, J_s, A)
     threshold = tolerance * np.trace(A)
-    pseudo_inverse_psd(A, threshold, A_inverse, root, space.values, vectors)
+    _pseudo_inverse(A, threshold, A_inverse, space.square_c[2:], space.values)
     _subtract_projection(P, X, A_inverse, scratch)
     return True
 
@@ -140,16 +219,14 @@ def operational_space(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space)
     n = space.gravity.shape[0]
     base = nv - n
     P = space.P
-    phi, phi_inverse, vectors = space.square_n[0], space.square_n[1], space.square_n[2]
-    work = space.square_n[3]
+    phi, phi_inverse, work = space.square_n[0], space.square_n[1], space.square_n[7]
     scale = 0.0
     for i in range(n):
         scale += space.M_inverse[base + i, base + i]
         for j in range(n):
             phi[i, j] = P[base + i, base + j]
             work[i, j] = phi[i, j]
-    root = space.joint_from_base[:n]
-    pseudo_inverse_psd(work, tolerance * scale, phi_inverse, root, space.values, vectors)
+    _pseudo_inverse(work, tolerance * scale, phi_inverse, space.square_n[2:7], space.values)
     for i in range(nv):
         for j in range(n):
             space.tall_n[i, j] = P[i, base + j]
@@ -187,7 +264,7 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
     P, phi_inverse = space.P, space.square_n[1]
     nv, n = space.joint_from_base.shape
     base = nv - n
-    X, scratch = space.wide_m[0][:size], space.wide_m[1][:size]
+    X, scratch = space.wide_m[:size], space.lift[first:last]
     multiply(J_t[first:last], P, X)
     H = space.square_m[0].ravel()[: size * size].reshape(size, size)
     Lambda = space.square_m[1].ravel()[: size * size].reshape(size, size)
@@ -264,18 +341,19 @@ def task_torque(J_star, stiffness, error, gravity, out):
 def warm() -> None:
     """Compile every kernel of this module."""
     space = allocate(2, 1, 1, m=1)
-    operational_space(
-        np.eye(2),
-        np.zeros(2),
-        np.array([[1.0, 0.5]]),
-        np.array([[0.0, 1.0]]),
-        np.eye(1),
-        np.array([0, 1]),
-        SYMMETRIC,
-        False,
-        1e-10,
-        space,
-    )
+    for M in (np.eye(2), np.asfortranarray(np.eye(2))):
+        operational_space(
+            M,
+            np.zeros(2),
+            np.array([[1.0, 0.5]]),
+            np.array([[0.0, 1.0]]),
+            np.eye(1),
+            np.array([0, 1]),
+            SYMMETRIC,
+            False,
+            1e-10,
+            space,
+        )
     operational_spaces(
         np.eye(2)[None],
         np.zeros((1, 2)),

@@ -1,7 +1,8 @@
 """The whole-body controller: tasks, contact-consistent matrices, and what it feeds back."""
 
-from sealag.whole_body._controller import Controller, ControllerOptions
+from sealag.whole_body._controller import Controller
 from sealag.whole_body._linearise import Linearisation, linearise
+from sealag.whole_body._options import ControllerOptions, TaskError
 from sealag.whole_body._protocol import Measurement, StoringController, TickController
 from sealag.whole_body._stack import (
     RANK_TOLERANCE,
@@ -10,6 +11,7 @@ from sealag.whole_body._stack import (
     relative_asymmetry,
 )
 from sealag.whole_body._static_joint import StaticJointState, static_joint_state
+from sealag.whole_body._tank import TankFlow
 from sealag.whole_body._tasks import (
     Feedback,
     GravityCompensation,
@@ -33,7 +35,9 @@ __all__ = [
     "StaticJointState",
     "StiffnessForm",
     "StoringController",
+    "TankFlow",
     "Task",
+    "TaskError",
     "TaskInertia",
     "TaskKind",
     "TickController",

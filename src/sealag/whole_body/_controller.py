@@ -1,54 +1,28 @@
 """The centralised whole-body operational-space controller, Eqs. (10)-(17), one tick at a time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from sealag.actuation import Actuators
-from sealag.errors import ContractionError, InputError, RobotError
-from sealag.robot import Contact, Robot, Workspace
+from sealag.errors import ContractionError, RobotError
+from sealag.robot import Contact, Robot
 from sealag.typing import Array, ArrayLike
+from sealag.whole_body._options import ControllerOptions, TaskError
 from sealag.whole_body._protocol import Measurement
 from sealag.whole_body._stack import FORM_CODE, RANK_TOLERANCE
-from sealag.whole_body._tasks import (
-    Feedback,
-    GravityCompensation,
-    Hierarchy,
-    Task,
-    TaskInertia,
-    TaskKind,
-)
+from sealag.whole_body._tank import EnergyTank
+from sealag.whole_body._task_reader import TaskReader
+from sealag.whole_body._tasks import Feedback, GravityCompensation, Hierarchy, TaskInertia
 
-_SETTLE = 5  # iterations for q̄(θ) of the true state, where only the storage is wanted
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerOptions:
-    """What the law does besides its stiffness.
-
-    Attributes:
-        feedback: the signal that is fed back.
-        gravity: where gravity compensation takes its configuration from.
-        velocity_feedforward: whether D_θ θ̇_d of the reference motion is added, so that the
-            embedded damping acts on θ̇ − θ̇_d only.
-        static_iterations: fixed-point iterations a tick for q̄(θ), warm-started.
-        tank_energy: energy in the tank at the start, J; for feedback through the tank.
-        tank_rate: rate at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s.
-        delay_bound: d̄ that the tank's flow pays for, s.
-    """
-
-    feedback: Feedback = Feedback.MOTOR
-    gravity: GravityCompensation = GravityCompensation.PLANNED
-    velocity_feedforward: bool = True
-    static_iterations: int = 2
-    tank_energy: float = 1.0
-    tank_rate: float = 5.0
-    delay_bound: float = 0.0
+_SETTLE = 6  # iterations for q̄(θ) of the true state, where only the storage is wanted
+_SETTLED = 1e-12  # rad: a smaller step of q̄(θ) is the last
+_LOST = 10.0  # rad: a larger one is no robot's
+_GAUSS = ((0.5 - 0.5 / 3**0.5, 0.5), (0.5 + 0.5 / 3**0.5, 0.5))  # places and weights on 0 … 1
 
 
 class Controller:
-    """τ_osc = Σ J*ᵀ S (x_d − x) + ḡ + D_θ θ̇_d at the fed-back configuration.
+    """τ_osc = Σ J*ᵀ S x̃ + ḡ + D_θ θ̇_d at the fed-back configuration.
 
     The configuration that x and all matrices are taken at is moved from the measured one along
     the contact-consistent motions by the difference between the fed-back joint angles and the
@@ -81,35 +55,58 @@ class Controller:
                 rows by priority; None holds still.
 
         Raises:
+            InputError: the posture has another shape.
             UnknownNameError: a frame or joint does not exist.
             RobotError: the mass matrix at the posture is not positive definite.
         """
-        from sealag.kernels.operational_space import allocate
+        from sealag.kernels import control_law, operational_space
 
+        self._law_kernels, self._space_kernels = control_law, operational_space
         self.options = options or ControllerOptions()
         self._robot, self._actuators, self._reference = robot, actuators, reference
-        self._hierarchy, self._contacts = hierarchy, tuple(contacts)
+        self._reader = TaskReader(robot, hierarchy, posture)
+        self._form = FORM_CODE[hierarchy.form]
+        self._star = hierarchy.task_inertia is TaskInertia.LAMBDA_STAR
         self._K_x = hierarchy.gain(robot)
         self._levels = np.array(hierarchy.levels(robot))
-        self._rows = hierarchy.rows(robot)
-        m, c = self._K_x.shape[0], sum(contact.kind.rows for contact in contacts)
-        self._J_t, self._J_s = np.zeros((m, robot.nv)), np.zeros((c, robot.nv))
-        self._error, self._target = np.zeros(m), np.zeros(m)
-        self._space = allocate(robot.nv, robot.n, c, m=m)
-        self._at = robot.workspace()
-        self._rest = np.zeros(robot.nv)
-        self._wanted = _targets(robot, hierarchy, np.asarray(posture, dtype=float))
+        self._consistent = self.options.task_error is TaskError.CONSISTENT
+        self._contacts, c = _contact_rows(robot, contacts)
+        self._allocate(m=len(self._K_x), c=c)
         self._solve(np.asarray(posture, dtype=float))
+        self._along[:] = self._space.joint_from_base
         self._planned_gravity = self._space.gravity.copy()
-        self._sag = np.zeros(robot.n)
-        self._x_hat: Array | None = None
-        self._energy, self._last = self.options.tank_energy, 0.0
-        self.contraction = 0.0
+
+    def _allocate(self, *, m: int, c: int) -> None:
+        nv, n, options = self._robot.nv, self._robot.n, self.options
+        self._space = self._space_kernels.allocate(nv, n, c, m=m)
+        self._at = self._robot.workspace()
+        self._J_t, self._J_s = np.zeros((m, nv)), np.zeros((c, nv))
+        self._error, self._offset, self._wanted = np.zeros(m), np.zeros(m), np.zeros(m)
+        self._rest, self._motion, self._none = np.zeros(nv), np.zeros(nv), np.zeros(n)
+        self._along = np.zeros((nv, n))
+        self._sag, self._step, self._square = np.zeros(n), np.zeros(n), np.zeros((n, n))
+        self._theta, self._last = np.zeros(n), 0.0
+        self._tank = EnergyTank(
+            size=m,
+            energy=options.tank_energy,
+            rate=options.tank_rate,
+            delay_bound=options.delay_bound,
+            flow=options.tank_flow,
+        )
 
     @property
     def tank_energy(self) -> float:
-        """Energy left in the tank, J."""
-        return self._energy
+        """Energy left in the tank, J; never below 0."""
+        return self._tank.energy
+
+    @property
+    def contraction(self) -> float:
+        """‖K^-½ J*ᵀ S J* K^-½‖ where the law was last evaluated: below 1, q̄(θ) exists.
+
+        The gradient of gravity compensation that is fed back is not in it; see `evaluate`.
+        """
+        J, root = self._space.J_star, np.sqrt(self._actuators.spring_stiffness)
+        return float(np.linalg.norm(J.T @ self._space.stiffness @ J / np.outer(root, root), 2))
 
     def reset(self, t: float, measurement: Measurement) -> None:
         """Forget the past: fill the tank, start q̄(θ) and x̂ anew.
@@ -119,9 +116,10 @@ class Controller:
             measurement: the state then.
         """
         self._sag[:] = measurement.q_joint - measurement.theta
-        self._x_hat, self._last = None, t
-        self._energy = self.options.tank_energy
+        self._tank.empty_memory()
+        self._last = t
         self._solve(measurement.q)
+        self._along[:] = self._space.joint_from_base
 
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
         """Compute the command of Eqs. (11), (17).
@@ -133,175 +131,191 @@ class Controller:
 
         Raises:
             RobotError: the mass matrix is not positive definite.
-            ContractionError: q̄(θ) is fed back and its iteration diverges.
+            ContractionError: q̄(θ) is fed back and does not exist: the task is stiffer than the
+                springs.
         """
-        offset, rate = self._reference(t) if self._reference else (None, None)
+        rate = self._refer(t)
         match self.options.feedback:
             case Feedback.JOINT:
-                self._law(measurement, measurement.q_joint, offset, out)
+                self._law(measurement, measurement.q_joint, out)
             case Feedback.MOTOR:
-                self._law(measurement, measurement.theta, offset, out)
+                self._law(measurement, measurement.theta, out)
             case Feedback.STATIC_JOINT:
-                self._static_law(measurement, offset, out)
+                self._static_law(measurement, self._sag, self.options.static_iterations, out)
             case Feedback.STATIC_JOINT_TANK:
-                self._static_law(measurement, offset, out)
+                self._static_law(measurement, self._sag, self.options.static_iterations, out)
                 self._tank_law(t, measurement, out)
+        self._along[:] = self._space.joint_from_base
         if rate is not None and self.options.velocity_feedforward:
-            wanted = np.linalg.lstsq(self._space.J_star, rate, rcond=1e-6)[0]
-            out += self._actuators.motor_damping * wanted
+            rate = np.array(rate, dtype=float)
+            self._leave_to_higher(rate)
+            theta_dot = np.linalg.lstsq(self._space.J_star, rate, rcond=1e-6)[0]
+            out += self._actuators.motor_damping * theta_dot
 
     def storage(self, t: float, measurement: Measurement) -> float:
-        """Return V_3, the potential of the command, and the tank's energy, J.
+        """Return V_3, the potential of the undelayed command, and the tank's energy, J.
 
-        Task stiffness is frozen where it is. For q̄(θ) the potential is that of the law at q̄ plus
-        ½ lᵀ K⁻¹ l, whose gradient in θ is l(q̄(θ)).
+        Its gradient in θ is minus the command, with J* and S frozen where they are:
+        V_3 = ½ x̃ᵀ S x̃ − ∫ ḡᵀ dθ; for q̄(θ) that at q̄, less ½ lᵀ K⁻¹ l; through the tank with
+        x̃̂ = x_d − x̂, x̂ carried on by J* from the last measured θ to the true one. Compensation
+        that is fed back has a potential up to its asymmetry. `tank_energy` is the tank's part
+        alone. The next tick is what it would have been without this call.
 
         Args:
             t: instant at which the references are taken, s.
             measurement: the true state then.
         """
-        feedback, scratch = self.options.feedback, np.zeros(self._robot.n)
-        offset = self._reference(t)[0] if self._reference else None
+        feedback, torque = self.options.feedback, np.zeros(self._robot.n)
+        self._refer(t)
         joints = measurement.q_joint if feedback is Feedback.JOINT else measurement.theta
         if feedback in (Feedback.STATIC_JOINT, Feedback.STATIC_JOINT_TANK):
             sag = self._sag.copy()
-            for _ in range(_SETTLE):
-                self._law(measurement, measurement.theta + sag, offset, scratch)
-                sag = -scratch / self._actuators.spring_stiffness
+            self._static_law(measurement, sag, _SETTLE, torque)
             joints = measurement.theta + sag
-        self._law(measurement, joints, offset, scratch)
-        error = self._error
-        if feedback is Feedback.STATIC_JOINT_TANK and self._x_hat is not None:
-            error = -self._x_hat
-        potential = 0.5 * float(error @ self._space.stiffness @ error)
-        if self.options.gravity is GravityCompensation.PLANNED:
-            potential -= float(self._planned_gravity @ joints)
-        if feedback is Feedback.STATIC_JOINT:
-            potential += 0.5 * float(scratch @ (scratch / self._actuators.spring_stiffness))
+        else:
+            self._law(measurement, joints, torque)
         if feedback is Feedback.STATIC_JOINT_TANK:
-            potential += self._energy
-        return potential
+            joints = measurement.theta
+            self._gravity_of_motors(measurement)
+            if self._tank.started:
+                carried = self._space.J_star @ (measurement.theta - self._theta)
+                self._error[:] = self._wanted - self._tank.position - carried
+        energy = 0.5 * float(self._error @ self._space.stiffness @ self._error)
+        if feedback is Feedback.STATIC_JOINT:
+            energy -= 0.5 * float(torque @ (torque / self._actuators.spring_stiffness))
+        if feedback is Feedback.STATIC_JOINT_TANK:
+            energy += self._tank.energy
+        match self.options.gravity:
+            case GravityCompensation.PLANNED:
+                energy -= float(self._planned_gravity @ joints)
+            case GravityCompensation.FEEDBACK:
+                energy -= self._work_of_gravity(measurement, joints)
+        return energy
+
+    def _work_of_gravity(self, measurement: Measurement, joints: Array) -> float:
+        """U_g of the measured configuration and ∫ ḡᵀ dq_j from there to the fed-back one."""
+        away, unused = joints - measurement.q_joint, np.zeros(self._robot.n)
+        self._solve(measurement.q)
+        work = float(self._at.potential_energy)
+        for place, weight in _GAUSS:
+            self._law(measurement, measurement.q_joint + place * away, unused)
+            work += weight * float(self._space.gravity @ away)
+        return work
+
+    def _refer(self, t: float) -> Array | None:
+        """Take the references of an instant; their rate, if there are any."""
+        if self._reference is None:
+            return None
+        offset, rate = self._reference(t)
+        self._offset[:] = offset
+        return rate
 
     def _solve(self, q: Array) -> None:
-        """Evaluate J*, S, ḡ and the task error at a configuration."""
-        from sealag.kernels.operational_space import operational_space
-
-        at, first = self._at, 0
+        """Evaluate J*, S, ḡ and the task errors at a configuration."""
+        at = self._at
         at.update(q, self._rest)
-        for contact in self._contacts:
-            last = first + contact.kind.rows
-            self._J_s[first:last] = at.frame_jacobian(contact.frame)[: contact.kind.rows]
-            first = last
-        first = 0
-        for row in self._rows:
-            last = first + len(row.rows)
-            self._J_t[first:last] = row.take(at)
-            first = last
-        good = operational_space(
+        for frame, place, rows in self._contacts:
+            self._J_s[place] = at.frame_jacobian(frame)[:rows]
+        self._reader.jacobian(at, self._J_t)
+        good = self._space_kernels.operational_space(
             at.M, at.nle, self._J_s, self._J_t, self._K_x, self._levels,
-            FORM_CODE[self._hierarchy.form],
-            self._hierarchy.task_inertia is TaskInertia.LAMBDA_STAR,
-            RANK_TOLERANCE, self._space,
+            self._form, self._star, RANK_TOLERANCE, self._space,
         )  # fmt: skip
         if not good:
             raise RobotError(f"The mass matrix of {self._robot.name} is not positive definite.")
-        self._measure_error(q)
+        self._reader.error(at, q, self._error)
+        self._error += self._offset
+        self._wanted[:] = self._offset
+        if self._consistent:
+            self._leave_to_higher(self._error)
+            self._leave_to_higher(self._wanted)
 
-    def _measure_error(self, q: Array) -> None:
-        """x_d − x of every task row, rotations as rotation vectors in world axes."""
-        first = 0
-        for (task, wanted), row in zip(self._wanted, self._rows, strict=True):
-            last = first + len(row.rows)
-            self._error[first:last] = _difference(task, wanted, self._at, q=q, rows=row.rows)
-            first = last
+    def _leave_to_higher(self, error: Array) -> None:
+        """Take out of errors, or rates, of the tasks what the tasks above will do."""
+        if len(self._levels) > 2:
+            self._law_kernels.leave_to_higher(
+                self._J_t, self._space.lift, self._levels, error, self._motion
+            )
 
-    def _law(
-        self, measurement: Measurement, joints: Array, offset: Array | None, out: Array
-    ) -> None:
-        """The static law at given joint angles."""
-        from sealag.kernels.operational_space import task_torque
-
-        shift = self._space.joint_from_base @ (joints - measurement.q_joint)
-        self._solve(self._robot.integrate(measurement.q, shift))
-        if offset is not None:
-            self._error += offset
+    @property
+    def _gravity(self) -> Array:
         match self.options.gravity:
             case GravityCompensation.FEEDBACK:
-                gravity = self._space.gravity
+                return self._space.gravity
             case GravityCompensation.PLANNED:
-                gravity = self._planned_gravity
+                return self._planned_gravity
             case _:
-                gravity = self._rest[: self._robot.n]
-        task_torque(self._space.J_star, self._space.stiffness, self._error, gravity, out)
+                return self._none
 
-    def _static_law(self, measurement: Measurement, offset: Array | None, out: Array) -> None:
-        """The law at q̄(θ): q̄ ← θ − K⁻¹ l(q̄), warm-started with the last sag q̄ − θ."""
-        before = np.inf
-        for _ in range(max(1, self.options.static_iterations)):
-            self._law(measurement, measurement.theta + self._sag, offset, out)
-            new = -out / self._actuators.spring_stiffness
-            change = float(np.abs(new - self._sag).max())
-            if np.isfinite(before) and before > 1e-9:
-                self.contraction = change / before
-            self._sag[:], before = new, change
-        if not np.isfinite(before) or before > 10.0:
-            raise ContractionError("q̄(θ) diverges: the task is stiffer than the springs.")
+    def _torque(self, out: Array) -> None:
+        space = self._space
+        self._space_kernels.task_torque(
+            space.J_star, space.stiffness, self._error, self._gravity, out
+        )
+
+    def _law(self, measurement: Measurement, joints: Array, out: Array) -> None:
+        """The law l at given joint angles."""
+        shift = self._along @ (joints - measurement.q_joint)
+        self._solve(self._robot.integrate(measurement.q, shift))
+        self._torque(out)
+
+    def _static_law(
+        self, measurement: Measurement, sag: Array, iterations: int, out: Array
+    ) -> None:
+        """The law at q̄(θ) by Newton's method, from the last sag q̄ − θ, which is moved.
+
+        The springs carry it: l(q̄) = K (θ − q̄) = −K sag, so that the last step needs no new
+        evaluation of the law.
+        """
+        K, space, step = self._actuators.spring_stiffness, self._space, self._step
+        for _ in range(iterations):
+            self._law(measurement, measurement.theta + sag, out)
+            exists = self._law_kernels.static_step(
+                space.J_star, space.stiffness, K, out, sag, self._square, step
+            )
+            size = float(np.abs(step).max())
+            if not (exists and size < _LOST):
+                raise ContractionError(
+                    "q̄(θ) does not exist: the task is stiffer than the springs "
+                    f"(contraction factor {self.contraction:.2f}; below 1 is needed)."
+                )
+            if size < _SETTLED:
+                break
+        out[:] = -K * sag
+        self._error -= space.J_star @ step
+
+    def _gravity_of_motors(self, measurement: Measurement) -> None:
+        """With the tank, compensation that is fed back is taken at θ, whose gradient it has."""
+        if self.options.gravity is GravityCompensation.FEEDBACK:
+            self._law(measurement, measurement.theta, self._step)
 
     def _tank_law(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Replace x(q̄(θ)) by the tank's x̂, whose flow u the tank's energy pays for.
-
-        x̂̇ = u + J* θ̇ and Ė = x̃̂ᵀ S u − ½ d̄ uᵀ S u − d̄ uᵀ S J* θ̇, with Q = S, the multiplier
-        that is optimal for a symmetric stiffness; u = 0 when the tank is empty.
-        """
-        J, S = self._space.J_star, self._space.stiffness
-        if self._x_hat is None:
-            self._x_hat = -self._error.copy()
-        step, self._last = max(t - self._last, 0.0), t
-        flow = J @ measurement.theta_dot
-        u = self.options.tank_rate * (-self._error - self._x_hat)
-        d = self.options.delay_bound
-        power = -self._x_hat @ S @ u - 0.5 * d * u @ S @ u - d * u @ S @ flow
-        if self._energy + step * power < 0.0:
-            u, power = np.zeros_like(u), 0.0
-        self._energy += step * float(power)
-        out += J.T @ S @ (-self._x_hat - self._error)
-        self._x_hat = self._x_hat + step * (u + flow)
-
-
-def _targets(robot: Robot, hierarchy: Hierarchy, posture: Array) -> list[tuple[Task, Array]]:
-    """What each task shall reach: its value at the reference posture."""
-    if posture.shape != (robot.nq,):
-        raise InputError(f"The posture has shape {posture.shape}; ({robot.nq},) is needed.")
-    wanted = []
-    for task in hierarchy.ordered:
-        match task.kind:
-            case TaskKind.COM:
-                value = robot.center_of_mass(posture)
-            case TaskKind.POSTURE:
-                value = robot.joint_positions(posture)
-            case _:
-                rotation, position = robot.frame_placement(task.frame or "", posture)
-                value = np.hstack([rotation, position[:, None]])
-        wanted.append((task, value))
-    return wanted
+        """Replace x(q̄(θ)) by the tank's x̂."""
+        tank, target = self._tank, self._wanted - self._error
+        self._gravity_of_motors(measurement)
+        space = self._space
+        if tank.started:
+            tank.step(
+                t - self._last,
+                space.J_star @ (measurement.theta - self._theta),
+                wanted=self._wanted,
+                target=target,
+                stiffness=space.stiffness,
+            )
+        else:
+            tank.start(target)
+        self._theta[:], self._last = measurement.theta, t
+        self._error[:] = self._wanted - tank.position
+        self._torque(out)
 
 
-def _difference(
-    task: Task, wanted: Array, at: Workspace, *, q: Array, rows: tuple[int, ...]
-) -> Array:
-    """x_d − x on the chosen rows."""
-    pick = list(rows)
-    if task.kind is TaskKind.COM:
-        return (wanted - at.com)[pick]
-    if task.kind is TaskKind.POSTURE:
-        return (wanted - q[len(q) - len(wanted) :])[pick]
-    rotation, position = at.frame_placement(task.frame or "")
-    both = np.concatenate([wanted[:, 3] - position, _rotation_vector(wanted[:, :3] @ rotation.T)])
-    return both[pick]
-
-
-def _rotation_vector(R: Array) -> Array:
-    """The rotation vector of R, in the axes that R is written in."""
-    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
-    sine, cosine = float(np.linalg.norm(axis)), (float(np.trace(R)) - 1.0) / 2.0
-    return axis * (np.arctan2(sine, cosine) / sine) if sine > 1e-9 else axis
+def _contact_rows(
+    robot: Robot, contacts: tuple[Contact, ...]
+) -> tuple[list[tuple[str, slice, int]], int]:
+    """Each contact's frame, its place in J_s and its number of rows; and the rows of all."""
+    places, first = [], 0
+    for contact in contacts:
+        last = first + contact.kind.rows
+        places.append((robot.check_frame(contact.frame), slice(first, last), contact.kind.rows))
+        first = last
+    return places, first

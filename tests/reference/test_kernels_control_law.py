@@ -1,0 +1,96 @@
+"""The compiled parts of a controller's tick against plain NumPy and SciPy twins."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sealag.kernels.control_law import frame_error, leave_to_higher, static_step
+from sealag.kernels.operational_space import SYMMETRIC, allocate, operational_space
+
+
+def turned(axis, angle):
+    return Rotation.from_rotvec(angle * np.asarray(axis) / np.linalg.norm(axis)).as_matrix()
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.3, 2.0, 3.0, 3.1, np.pi - 1e-7, np.pi])
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, -1, 0), (0, 0, 1), (1, -2, 3), (-1, 1, 0)])
+def test_frame_error_is_the_rotation_vector_up_to_half_a_turn(axis, angle):
+    R = turned((0.3, 0.2, -0.5), 1.1)
+    wanted, out = turned(axis, angle) @ R, np.zeros(6)
+    frame_error(wanted, np.array([1.0, 2.0, 3.0]), np.asfortranarray(R), np.ones(3), out)
+    np.testing.assert_allclose(out[:3], [0.0, 1.0, 2.0], atol=1e-15)
+    back = Rotation.from_rotvec(out[3:]).as_matrix()
+    np.testing.assert_allclose(back @ R, wanted, atol=2e-8 if angle > 3.0 else 1e-12)
+    expected = angle * np.asarray(axis) / np.linalg.norm(axis)
+    if angle < np.pi:
+        np.testing.assert_allclose(out[3:], expected, atol=2e-8)
+    assert np.linalg.norm(out[3:]) == pytest.approx(angle, abs=2e-8)
+
+
+def plain_leave(J, M_inverse, levels, error):
+    """x̃_{k|prec} with projectors written out."""
+    out, P = error.copy(), M_inverse.copy()
+    motion = np.zeros(len(M_inverse))
+    for first, last in itertools.pairwise(levels):
+        J_k = J[first:last]
+        out[first:last] -= J_k @ motion
+        Lambda = np.linalg.pinv(J_k @ P @ J_k.T, rcond=1e-8, hermitian=True)
+        motion += P @ J_k.T @ Lambda @ out[first:last]
+        P = P - P @ J_k.T @ Lambda @ J_k @ P
+    return out
+
+
+@pytest.mark.parametrize("levels", [[0, 6], [0, 3, 6], [0, 2, 5, 8], [0, 6, 14]])
+def test_errors_of_lower_tasks_move_as_their_own_jacobian_says(levels):
+    rng = np.random.default_rng(len(levels))
+    nv, m = 9, levels[-1]
+    X = rng.normal(size=(nv, nv))
+    M, J = X @ X.T + np.eye(nv), rng.normal(size=(m, nv))
+    space = allocate(nv, nv, 0, m=m)
+    assert operational_space(
+        M, np.zeros(nv), np.zeros((0, nv)), J, np.eye(m), np.array(levels), SYMMETRIC, False, 1e-9,
+        space,
+    )  # fmt: skip
+    error = rng.normal(size=m)
+    out = error.copy()
+    leave_to_higher(J, space.lift, np.array(levels), out, np.zeros(nv))
+    np.testing.assert_allclose(out, plain_leave(J, np.linalg.inv(M), levels, error), atol=1e-8)
+    moved = J.copy()
+    for column in moved.T:
+        part = column.copy()
+        leave_to_higher(J, space.lift, np.array(levels), part, np.zeros(nv))
+        column[:] = part
+    np.testing.assert_allclose(moved, space.J_star, atol=1e-8)
+    if len(levels) > 2:
+        assert np.abs(J - space.J_star).max() > 0.1
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_static_step_is_newton_s(symmetric):
+    rng = np.random.default_rng(8)
+    m, n = 4, 6
+    J, X = rng.normal(size=(m, n)), rng.normal(size=(m, m))
+    S = X @ X.T if symmetric else X @ X.T + 0.3 * (X - X.T)
+    F = J.T @ S @ J
+    K = 1.5 * np.linalg.norm(F, 2) * rng.uniform(1.0, 2.0, n)
+    torque, sag = rng.normal(size=n), rng.normal(size=n)
+    step, moved = np.zeros(n), sag.copy()
+    assert static_step(J, S, K, torque, moved, np.zeros((n, n)), step)
+    expected = np.linalg.solve(np.diag(K) - F, -K * sag - torque)
+    np.testing.assert_allclose(step, expected, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(moved, sag + expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_static_step_refuses_exactly_where_the_fixed_point_is_no_contraction(seed):
+    rng = np.random.default_rng(seed)
+    J, X, K = rng.normal(size=(3, 5)), rng.normal(size=(3, 3)), rng.uniform(1.0, 9.0, 5)
+    S, root = X @ X.T, np.sqrt(K)
+    factor = np.linalg.norm(J.T @ S @ J / np.outer(root, root), 2)
+    for share in (0.999, 1.001):
+        exists = static_step(
+            J, S * (share / factor), K, np.zeros(5), np.zeros(5), np.zeros((5, 5)), np.zeros(5)
+        )
+        assert exists == (share < 1.0)

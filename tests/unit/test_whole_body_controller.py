@@ -1,0 +1,447 @@
+"""What is certified is what runs: the controller's ticks against `evaluate` and its own storage."""
+
+import gc
+import subprocess
+import sys
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from helpers.chains import planar_arm
+from sealag.actuation import actuators
+from sealag.design import load
+from sealag.errors import ContractionError, InputError, UnknownNameError
+from sealag.robot import Contact, Motion
+from sealag.whole_body import (
+    Controller,
+    ControllerOptions,
+    Feedback,
+    GravityCompensation,
+    Hierarchy,
+    Measurement,
+    StiffnessForm,
+    StoringController,
+    Task,
+    TaskError,
+    TaskKind,
+    TickController,
+    evaluate,
+    relative_asymmetry,
+)
+
+ANYMAL = load("examples/anymal.toml")
+BAXTER = load("examples/baxter.toml")
+HUME = load("bundled:hume")
+ONE_FOOT = (Contact(frame="right_foot"),)
+STANCES = {
+    "baxter": (BAXTER, ()),
+    "anymal": (ANYMAL, ANYMAL.contacts),
+    "hume on one foot": (HUME, ONE_FOOT),
+}
+AGREE = 1e-6  # of the largest entry: rounding and truncation of two central differences
+
+
+def build(system, contacts, *, hierarchy=None, motors=None, reference=None, **options):
+    options = {"feedback": Feedback.MOTOR, "gravity": GravityCompensation.NONE, **options}
+    return Controller(
+        system.robot,
+        hierarchy or system.hierarchy,
+        motors or system.actuators,
+        contacts=tuple(contacts),
+        posture=system.posture,
+        options=ControllerOptions(**options),
+        reference=reference,
+    )
+
+
+def certified(system, contacts, *, hierarchy=None, feedback=Feedback.MOTOR, gravity="none"):
+    still = Motion(
+        time=np.zeros(1),
+        q=system.posture[None],
+        v=np.zeros((1, system.robot.nv)),
+        contact_sets=(tuple(contacts),),
+        contact_index=np.zeros(1, dtype=np.int64),
+    )
+    return evaluate(
+        system.robot, hierarchy or system.hierarchy, system.actuators,
+        motion=still, feedback=feedback, gravity=GravityCompensation(gravity),
+    )  # fmt: skip
+
+
+def at_posture(system, *, torque=None):
+    """The state at the posture, with motors ahead of the joints by what the springs carry."""
+    robot = system.robot
+    measured = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n)
+    measured.q[:] = system.posture
+    measured.theta[:] = robot.joint_positions(system.posture)
+    if torque is not None:
+        measured.theta[:] += torque / system.actuators.spring_stiffness
+    return measured
+
+
+def without_errors(system, controller, stack):
+    """The state whose fed-back configuration is the posture, where all task errors are 0."""
+    options = controller.options
+    at_q_bar = options.feedback is Feedback.STATIC_JOINT or (
+        options.feedback is Feedback.STATIC_JOINT_TANK
+        and options.gravity is GravityCompensation.PLANNED
+    )
+    carried = at_q_bar and options.gravity is not GravityCompensation.NONE
+    return at_posture(system, torque=stack.gravity[0] if carried else None)
+
+
+def stiffness_that_runs(controller, measured, *, column=None, step=1e-5):
+    """−∂(command)/∂θ, each column from a fresh start at the same state."""
+    rest, n = measured.data.copy(), len(measured.theta)
+    out, F = np.zeros(n), np.zeros((n, n))
+    for j in range(n):
+        for sign in (1.0, -1.0):
+            measured.data[:] = rest
+            controller.reset(0.0, measured)
+            controller.tick(0.0, measured, out)
+            controller._tank.position[:] = 0.0
+            if column is None:
+                measured.theta[j] += sign * step
+            else:
+                measured.q[:] = column(j, sign * step)
+            controller.tick(0.0, measured, out)
+            F[:, j] -= sign * out / (2.0 * step)
+    measured.data[:] = rest
+    return F
+
+
+@pytest.mark.parametrize("form", list(StiffnessForm))
+@pytest.mark.parametrize("gravity", list(GravityCompensation))
+@pytest.mark.parametrize("feedback", list(Feedback))
+@pytest.mark.parametrize("stance", STANCES)
+def test_certified_stiffness_is_the_derivative_of_the_command(stance, feedback, gravity, form):
+    system, contacts = STANCES[stance]
+    hierarchy = replace(system.hierarchy, form=form)
+    stack = certified(system, contacts, hierarchy=hierarchy, feedback=feedback, gravity=gravity)
+    controller = build(
+        system, contacts, hierarchy=hierarchy, feedback=feedback, gravity=gravity,
+        static_iterations=20,
+    )  # fmt: skip
+    measured, column = without_errors(system, controller, stack), None
+    if feedback is Feedback.JOINT:
+        # Link angles move with the base, as the contacts allow it.
+        controller.reset(0.0, measured)
+        along = controller._space.joint_from_base.copy()
+
+        def column(j, step):
+            return system.robot.integrate(system.posture, step * along[:, j])
+
+    F = stiffness_that_runs(controller, measured, column=column)
+    certain = stack.F_theta[0]
+    np.testing.assert_allclose(F, certain, atol=AGREE * np.abs(certain).max())
+    if feedback is Feedback.STATIC_JOINT:
+        assert np.abs(F - stack.F_q[0]).max() > 0.05 * np.abs(certain).max(), "not that of x(θ)"
+
+
+def test_plain_errors_of_lower_tasks_run_another_stiffness_than_the_certified():
+    """The printed x̃_2 also answers to what task 1 moves: no potential, however symmetric S is."""
+    stack = certified(BAXTER, ())
+    F = stiffness_that_runs(build(BAXTER, (), task_error=TaskError.PLAIN), at_posture(BAXTER))
+    assert np.abs(F - stack.F_theta[0]).max() > 0.02 * np.abs(F).max()
+    assert relative_asymmetry(F) > 1e-3
+    first, S = stack.levels[1], stack.stiffness[0]
+    alone = replace(
+        BAXTER.hierarchy, tasks=tuple(replace(t, priority=1) for t in BAXTER.hierarchy.tasks)
+    )
+    J_all = certified(BAXTER, (), hierarchy=alone).J_star[0]
+    J = stack.J_star[0]
+    expected = J[:first].T @ S[:first, :first] @ J[:first]
+    expected += J[first:].T @ S[first:, first:] @ J_all[first:]
+    np.testing.assert_allclose(F, expected, atol=AGREE * np.abs(F).max())
+
+
+@pytest.mark.parametrize("contacts", [1, 2])
+def test_one_level_runs_the_same_with_either_error(contacts):
+    system = HUME if contacts == 1 else ANYMAL
+    feet = ONE_FOOT if contacts == 1 else ANYMAL.contacts
+    measured, out, plain = at_posture(system), np.zeros(system.robot.n), np.zeros(system.robot.n)
+    measured.theta[:] += 0.05
+    build(system, feet).tick(0.0, measured, out)
+    build(system, feet, task_error=TaskError.PLAIN).tick(0.0, measured, plain)
+    np.testing.assert_array_equal(out, plain)
+
+
+def response_to_free_motions(system, contacts):
+    """‖∂(command)/∂z‖ along motions that the contacts allow, with θ held."""
+    robot, measured = system.robot, at_posture(system)
+    J_s = robot.contact_jacobian(contacts, system.posture)
+    Z = np.linalg.svd(J_s)[2][np.linalg.matrix_rank(J_s) :]
+    controller, out, rows = build(system, contacts), np.zeros(robot.n), []
+    for z in Z:
+        row = np.zeros(robot.n)
+        for sign in (1.0, -1.0):
+            measured.q[:] = system.posture
+            controller.reset(0.0, measured)
+            measured.q[:] = robot.integrate(system.posture, sign * 1e-5 * z)
+            controller.tick(0.0, measured, out)
+            row += sign * out / 2e-5
+        rows.append(row)
+    return np.linalg.norm(rows, 2)
+
+
+def test_command_depends_on_motor_angles_alone_where_they_say_where_the_robot_is():
+    """On four feet it does; on one foot three motions are passive, and x answers to them too."""
+    assert response_to_free_motions(ANYMAL, ANYMAL.contacts) < 1e-5
+    assert response_to_free_motions(HUME, ONE_FOOT) > 10.0
+
+
+# The potential ---------------------------------------------------------------------------------
+def gradient(storage, measured, step=1e-4):
+    found = np.zeros(len(measured.theta))
+    for j in range(len(found)):
+        for sign in (1.0, -1.0):
+            measured.theta[j] += sign * step
+            found[j] += sign * storage(0.0, measured) / (2.0 * step)
+            measured.theta[j] -= sign * step
+    return found
+
+
+@pytest.mark.parametrize("gravity", list(GravityCompensation))
+@pytest.mark.parametrize("feedback", [f for f in Feedback if f is not Feedback.JOINT])
+@pytest.mark.parametrize("stance", STANCES)
+def test_storage_is_the_potential_of_the_command(stance, feedback, gravity):
+    """To first order in the task error: what is left falls with its square."""
+    system, contacts = STANCES[stance]
+    controller = build(system, contacts, feedback=feedback, gravity=gravity, static_iterations=20)
+    stack = certified(system, contacts, gravity=gravity)
+    away = np.random.default_rng(2).normal(size=system.robot.n)
+    rest, out = without_errors(system, controller, stack), np.zeros(len(away))
+    error, change = [], []
+    for scale in (2e-3, 1e-3):
+        measured = without_errors(system, controller, stack)
+        controller.reset(0.0, rest)
+        controller.tick(0.0, rest, out)
+        controller._tank.position[:] = 0.0
+        still = out.copy()
+        measured.theta[:] += scale * away
+        for _ in range(3):  # the matrices of the fed-back configuration settle
+            controller.tick(0.0, measured, out)
+        error.append(np.abs(gradient(controller.storage, measured) + out).max())
+        change.append(np.abs(out - still).max())
+    if stack.asymmetry[0] < 1e-8:
+        assert error[1] < 0.02 * change[1]
+        assert error[1] < 0.35 * error[0]
+    else:  # compensation that presses the feet apart has no potential
+        assert error[1] < 3.0 * stack.asymmetry[0] * change[1]
+
+
+def test_storage_of_motor_angles_is_not_that_of_the_static_joint_state():
+    measured, out = at_posture(BAXTER), np.zeros(BAXTER.robot.n)
+    measured.theta[:] += 1e-3
+    static = build(BAXTER, (), feedback=Feedback.STATIC_JOINT, static_iterations=20)
+    static.reset(0.0, measured)
+    static.tick(0.0, measured, out)
+    right = np.abs(gradient(static.storage, measured) + out).max()
+    wrong = np.abs(gradient(build(BAXTER, ()).storage, measured) + out).max()
+    assert right < 0.005 * np.abs(out).max()
+    assert wrong > 0.05 * np.abs(out).max()
+
+
+def test_storage_and_tank_are_told_apart():
+    controller = build(BAXTER, (), feedback=Feedback.STATIC_JOINT_TANK, tank_energy=3.0)
+    measured = at_posture(BAXTER)
+    controller.reset(0.0, measured)
+    controller.tick(0.0, measured, np.zeros(BAXTER.robot.n))
+    assert controller.tank_energy == 3.0
+    assert controller.storage(0.0, measured) == pytest.approx(3.0, abs=1e-12)
+    motor = build(BAXTER, (), tank_energy=3.0)
+    assert motor.storage(0.0, measured) == pytest.approx(0.0, abs=1e-12)
+
+
+# A driver's loop -------------------------------------------------------------------------------
+def wander(system, ticks, seed=3):
+    """Measurements of a robot that wanders about its posture."""
+    rng, robot = np.random.default_rng(seed), system.robot
+    measured = at_posture(system)
+    for k in range(ticks):
+        v = np.concatenate([np.zeros(robot.nv_base), 0.02 * rng.normal(size=robot.n)])
+        measured.data[0] = 1e-3 * k
+        measured.q[:] = robot.integrate(system.posture, v)
+        measured.theta[:] = measured.q_joint + 0.01 * rng.normal(size=robot.n)
+        measured.theta_dot[:] = rng.normal(size=robot.n)
+        yield measured
+
+
+@pytest.mark.parametrize("feedback", list(Feedback))
+def test_reset_makes_runs_repeatable_and_storage_leaves_no_trace(feedback):
+    controller = build(ANYMAL, ANYMAL.contacts, feedback=feedback, delay_bound=0.01)
+
+    def run(*, watched, again=True):
+        commands = []
+        for k, measured in enumerate(wander(ANYMAL, 30)):
+            if k == 0 and again:
+                controller.reset(0.0, measured)
+            commands.append(np.zeros(ANYMAL.robot.n))
+            controller.tick(1e-3 * k, measured, commands[-1])
+            if watched:
+                controller.storage(1e-3 * k, measured)
+        return np.array(commands)
+
+    first = run(watched=False)
+    np.testing.assert_array_equal(first, run(watched=True))
+    assert np.abs(np.diff(first, axis=0)).max() > 0.1
+    if feedback in (Feedback.STATIC_JOINT, Feedback.STATIC_JOINT_TANK):
+        assert not np.array_equal(first, run(watched=False, again=False)), "memory must show"
+
+
+def test_it_is_both_protocols_and_runs_without_the_simulator():
+    assert isinstance(build(BAXTER, ()), StoringController)
+    controller: TickController = build(BAXTER, ())
+    assert controller is not None
+    program = """
+import sys, numpy as np
+from sealag.actuation import actuators
+from sealag.robot import load_robot
+from sealag.whole_body import Controller, Hierarchy, Measurement, Task, TaskKind
+robot = load_robot("bundled:hume", floating_base=True)
+motors = actuators(robot.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
+task = Task(name="com", kind=TaskKind.COM, stiffness=100.0)
+posture = robot.configuration(np.full(robot.n, 0.2), base_position=(0, 0, 0.9))
+controller = Controller(robot, Hierarchy(tasks=(task,)), motors, contacts=(), posture=posture)
+measured = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n)
+command = np.zeros(robot.n)
+measured.q[:], measured.theta[:] = posture, 0.25
+controller.reset(0.0, measured)
+for k in range(100):
+    controller.tick(1e-3 * k, measured, command)
+assert np.isfinite(command).all() and np.abs(command).max() > 0.0
+print(sorted(name for name in sys.modules if name.startswith("sealag.")))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert "sealag.whole_body" in done.stdout
+    for room in ("simulation", "design", "passivity", "report", "cli"):
+        assert f"'sealag.{room}'" not in done.stdout
+
+
+class Leaking:
+    """A controller that keeps every command."""
+
+    def __init__(self, controller):
+        self.controller, self.kept = controller, []
+
+    def tick(self, t, measured, out):
+        self.controller.tick(t, measured, out)
+        self.kept.append(out.copy())
+
+
+def growth(controller, robot, ticks):
+    """Bytes that the second half of the ticks leaves behind."""
+    measured, out = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n), np.zeros(robot.n)
+    gc.collect()
+    tracemalloc.start()
+    try:
+        before = 0
+        for k in range(ticks):
+            measured.theta[:] = 0.1 * np.sin(0.01 * k)
+            controller.tick(1e-3 * k, measured, out)
+            if k == ticks // 2:
+                gc.collect()
+                before = tracemalloc.get_traced_memory()[0]
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0] - before
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("feedback", list(Feedback))
+def test_memory_stays_flat(tmp_path, feedback):
+    arm = planar_arm(tmp_path, count=2, mass=1.0, inertia=0.05, length=0.4)
+    motors = actuators(arm.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
+    task = Task(name="end", kind=TaskKind.POSITION, frame="link1", axes=(0, 1), stiffness=20.0)
+    controller = Controller(
+        arm, Hierarchy(tasks=(task,)), motors, contacts=(), posture=np.array([0.4, 0.6]),
+        options=ControllerOptions(feedback=feedback),
+    )  # fmt: skip
+    ticks = 20_000 if feedback is Feedback.STATIC_JOINT_TANK else 5_000  # it does all the others do
+    assert growth(controller, arm, ticks) < 2_000
+    if feedback is Feedback.MOTOR:
+        assert growth(Leaking(controller), arm, 2_000) > 50_000
+
+
+# Refusals and feedforward ----------------------------------------------------------------------
+def test_wrong_postures_and_names_are_refused():
+    for posture in (ANYMAL.posture[:-1], ANYMAL.posture[None], np.zeros(0)):
+        with pytest.raises(InputError, match="posture has shape"):
+            build(replace(ANYMAL, posture=posture), ANYMAL.contacts)
+    with pytest.raises(UnknownNameError, match="LF_FOOT"):
+        build(ANYMAL, (Contact(frame="LF_FOOTT"),))
+    build(ANYMAL, ANYMAL.contacts)
+
+
+@pytest.mark.parametrize("feedback", [Feedback.STATIC_JOINT, Feedback.STATIC_JOINT_TANK])
+def test_too_soft_springs_are_refused_at_the_first_tick(feedback):
+    robot, measured, out = BAXTER.robot, at_posture(BAXTER), np.zeros(BAXTER.robot.n)
+    factor = build(BAXTER, ()).contraction * BAXTER.actuators.spring_stiffness[0]
+    for share, fails in ((1.01, False), (0.99, True)):
+        motors = actuators(
+            robot.joints, spring_stiffness=share * factor, rotor_inertia=0.1, motor_damping=1.0
+        )
+        controller = build(BAXTER, (), motors=motors, feedback=feedback)
+        controller.reset(0.0, measured)
+        if fails:
+            with pytest.raises(ContractionError, match="stiffer than the springs"):
+                controller.tick(0.0, measured, out)
+        else:
+            controller.tick(0.0, measured, out)
+            assert controller.contraction == pytest.approx(1.0 / share, rel=1e-9)
+        build(BAXTER, (), motors=motors).tick(0.0, measured, out)
+
+
+def test_contraction_is_the_one_that_is_certified():
+    for system, contacts in STANCES.values():
+        controller, stack = build(system, contacts), certified(system, contacts)
+        assert controller.contraction == pytest.approx(stack.contraction[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("stance", ["baxter", "anymal"])
+def test_feedforward_is_the_damping_of_the_planned_motor_velocity(stance):
+    """J* θ̇_d = ẋ_d on every level: motions that the joints can make come back as they are."""
+    system, contacts = STANCES[stance]
+    robot = system.robot
+    J_s = robot.contact_jacobian(contacts, system.posture)
+    wish = np.random.default_rng(4).normal(size=robot.nv)
+    v = wish - np.linalg.pinv(J_s) @ J_s @ wish if len(J_s) else wish
+    at = robot.workspace_at(system.posture)
+    rate = np.vstack([row.take(at) for row in system.hierarchy.rows(robot)]) @ v
+    commands = {}
+    for wanted in (True, False):
+        controller = build(
+            system, contacts, velocity_feedforward=wanted,
+            reference=lambda t: (np.zeros(len(rate)), rate),
+        )  # fmt: skip
+        commands[wanted] = np.zeros(robot.n)
+        controller.tick(0.0, at_posture(system), commands[wanted])
+    theta_dot = (commands[True] - commands[False]) / system.actuators.motor_damping
+    np.testing.assert_allclose(controller._space.joint_from_base @ theta_dot, v, atol=1e-8)
+    if stance == "baxter":
+        np.testing.assert_allclose(theta_dot, v, atol=1e-8)
+    np.testing.assert_allclose(commands[False], 0.0, atol=1e-9)
+
+
+def test_reference_moves_the_equilibrium():
+    """The offset of the references is a task error, seen in the command."""
+    stack = certified(ANYMAL, ANYMAL.contacts)
+    offset = 0.01 * np.arange(1.0, 7.0)
+    controller = build(ANYMAL, ANYMAL.contacts, reference=lambda t: (t * offset, np.zeros(6)))
+    out = np.zeros(12)
+    for t in (0.0, 2.0):
+        controller.tick(t, at_posture(ANYMAL), out)
+        expected = stack.J_star[0].T @ stack.stiffness[0] @ (t * offset)
+        np.testing.assert_allclose(out, expected, atol=1e-8)
+    assert np.abs(expected).max() > 0.1
+
+
+def test_form_of_the_certified_task_is_the_hierarchy_s():
+    """A tracked hierarchy is not changed by the controller that runs it."""
+    hierarchy = Hierarchy(tasks=ANYMAL.hierarchy.tasks, form=StiffnessForm.FORCE)
+    controller = build(ANYMAL, ANYMAL.contacts, hierarchy=hierarchy)
+    np.testing.assert_allclose(controller._space.stiffness, hierarchy.gain(ANYMAL.robot))
