@@ -1,5 +1,6 @@
 """A control tick beside Pink's on the same robot."""
 
+import itertools
 import statistics
 import time
 from collections.abc import Callable
@@ -34,12 +35,16 @@ def _ours(feedback: Feedback) -> Callable[[], object]:
         posture=system.posture,
         options=ControllerOptions(feedback=feedback, gravity=system.gravity),
     )
-    measurement = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n)
-    measurement.q[:] = system.posture
-    measurement.theta[:] = robot.joint_positions(system.posture) + 0.01
-    out = np.zeros(robot.n)
-    controller.reset(0.0, measurement)
-    return lambda: controller.tick(0.0, measurement, out)
+    measurements = []
+    for away in (0.01, 0.012):  # changing, so that q̄(θ) has something to find
+        measurement = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n)
+        measurement.q[:] = system.posture
+        measurement.theta[:] = robot.joint_positions(system.posture) + away
+        measurements.append(measurement)
+    out, turn = np.zeros(robot.n), itertools.cycle(measurements)
+    clock = itertools.count()
+    controller.reset(0.0, measurements[0])
+    return lambda: controller.tick(1e-3 * next(clock), next(turn), out)
 
 
 def _pink() -> Callable[[], object]:
@@ -69,9 +74,10 @@ def _pink() -> Callable[[], object]:
 def run() -> None:
     """Print microseconds a tick on ANYmal with four feet, and the ratios."""
     print("\nOne control tick, ANYmal, four point feet, CoM and base orientation")
-    own = {kind: _median_us(_ours(kind)) for kind in (Feedback.MOTOR, Feedback.STATIC_JOINT)}
+    own = {kind: _median_us(_ours(kind)) for kind in Feedback}
     for kind, value in own.items():
-        print(f"  sealag, {kind.value:13} {value:8.1f} µs (torques from dynamics)")
+        print(f"  sealag, {kind.value:18} {value:7.1f} µs (torques from dynamics)")
     peer = _median_us(_pink())
-    print(f"  Pink                 {peer:8.1f} µs (velocities from kinematics, a smaller problem)")
-    print(f"  ratio Pink / sealag  {peer / own[Feedback.MOTOR]:8.1f}")
+    print(f"  Pink                       {peer:7.1f} µs (velocities, a smaller problem)")
+    for kind in (Feedback.MOTOR, Feedback.STATIC_JOINT_TANK):
+        print(f"  ratio Pink / {kind.value:18} {peer / own[kind]:5.1f}")
