@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,79 @@ def test_motion_of_many_instants(tmp_path, capsys):
     whole = json.loads((tmp_path / "c.json").read_text())
     assert len(whole["bounds_s"]) == len(motion)
     assert min(whole["bounds_s"]) == whole["max_delay_s"]
+
+
+def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
+    """Seven steps at 1 kHz, default proofs, common and time-varying multipliers."""
+    from sealag.design import load, save_motion
+    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+
+    system = load("bundled:hume")
+    motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=7), rate=1000.0)
+    walk, out = tmp_path / "walk.npz", tmp_path / "c.json"
+    save_motion(motion, system.robot, walk)
+    code, text, _ = run(
+        capsys,
+        "certify",
+        "bundled:hume",
+        "--motion",
+        walk,
+        "--time-varying",
+        "--json",
+        "--out",
+        out,
+    )
+    answer = json.loads(text)
+    assert code == 0
+    assert 0.0 < answer["time_varying_delay_s"] <= answer["common_multiplier_delay_s"] * (1 + 1e-6)
+    assert out.stat().st_size < 2_000_000
+    start = time.perf_counter()
+    code, text, _ = run(capsys, "verify", out, "--exact", "--json")
+    assert time.perf_counter() - start < 60.0
+    result = json.loads(text)
+    assert code == 0
+    assert result["valid"]
+    assert result["exact"]
+    names = {check["name"] for check in result["checks"]}
+    assert any(name.startswith("time-varying multiplier in all") for name in names)
+
+
+def test_proofs_are_as_many_as_asked_for(tmp_path, capsys):
+    from sealag.design import load, save_motion
+    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+
+    system = load("bundled:hume")
+    walk, out = tmp_path / "walk.npz", tmp_path / "c.json"
+    motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=50.0)
+    save_motion(motion, system.robot, walk)
+    counts = {}
+    for proofs in ("3", "all"):
+        code, _, _ = run(
+            capsys, "certify", "bundled:hume", "--motion", walk, "--proofs", proofs, "--criterion",
+            "published", "--json", "--out", out,
+        )  # fmt: skip
+        counts[proofs] = len(json.loads(out.read_text())["proofs"])
+        code, text, _ = run(capsys, "verify", out)
+        assert code == 0
+        assert text.endswith("the certificate holds\n")
+    assert counts == {"3": 3, "all": len(motion)}
+    for wrong in ("0", "-1", "some", "²"):
+        code, _, err = run(capsys, "certify", "bundled:hume", f"--proofs={wrong}", "--out", out)
+        assert code == 2
+        assert "--proofs is" in err
+
+
+def test_a_changed_digit_is_shown(tmp_path, capsys):
+    out = tmp_path / "c.json"
+    run(capsys, "certify", ROOT / "examples/baxter.toml", "--json", "--out", out)
+    data = json.loads(out.read_text())
+    number = repr(data["proofs"][0]["W"][0][0][0])
+    out.write_text(out.read_text().replace(number, repr(float(number) * 2.0)))
+    code, text, _ = run(capsys, "verify", out)
+    assert code == 1
+    assert "BAD  content is as written" in text
+    assert "BAD  instant 0: matrix inequality" in text
+    assert text.endswith("the certificate does not hold\n")
 
 
 def test_margin_command(capsys):

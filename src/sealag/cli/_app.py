@@ -62,6 +62,14 @@ def certify(
             "--time-varying", help="Also for matrices that move inside polytopes (1 s more)."
         ),
     ] = False,
+    proofs: Annotated[
+        str,
+        typer.Option(
+            "--proofs",
+            help="Instants whose numbers go into the certificate, those with the smallest bounds: "
+            "a number, or all.",
+        ),
+    ] = "12",
     as_json: Json = False,
 ) -> None:
     """Bound the delay at every instant of a motion; exit status 1 if it is not certified."""
@@ -73,6 +81,7 @@ def certify(
             motion,
             criterion=criterion,
             time_varying=time_varying,
+            proofs=proofs,
             out=out,
             as_json=as_json,
         )

@@ -15,6 +15,9 @@ from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms
 
+LARGEST_LIST = 250
+"""Checks that hold and are shown one by one."""
+
 
 def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     """Write a starter project; an existing file is not overwritten."""
@@ -43,15 +46,22 @@ def certify_project(
     *,
     criterion: str | None,
     time_varying: bool,
+    proofs: str,
     out: Path | None,
     as_json: bool,
 ) -> int:
     """Certify, write the certificate and show the answer; 1 if it is not certified."""
     if criterion is not None and criterion not in set(Criterion):
         raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
+    if proofs != "all" and not (proofs.isascii() and proofs.isdigit() and int(proofs) > 0):
+        raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
     system = load(project)
     certificate = certify(
-        system, _motion(system, motion), criterion=criterion, time_varying=time_varying
+        system,
+        _motion(system, motion),
+        criterion=criterion,
+        time_varying=time_varying,
+        proofs=None if proofs == "all" else int(proofs),
     )
     path = out or Path(f"{resolve_project(project).stem}.certificate.json")
     write_certificate(certificate, path)
@@ -136,8 +146,14 @@ def verify_certificate(path: Path, *, exact: bool, as_json: bool) -> int:
     if as_json:
         show_json(result.to_json_dict())
     else:
+        good = [check for check in result.checks if check.ok]
+        for check in good[:LARGEST_LIST]:
+            print(f"ok   {check.name}: {check.detail}")
+        if len(good) > LARGEST_LIST:
+            print(f"ok   {len(good) - LARGEST_LIST} more checks (--json lists them)")
         for check in result.checks:
-            print(f"{'ok ' if check.ok else 'BAD'}  {check.name}: {check.detail}")
+            if not check.ok:
+                print(f"BAD  {check.name}: {check.detail}")
         print("the certificate holds" if result.valid else "the certificate does not hold")
     return 0 if result.valid else 1
 

@@ -1,10 +1,10 @@
 """The user's project file, motions in and out, and the certificate of a design."""
 
-from sealag.design._certify import (
+from sealag.design._certify import certify
+from sealag.design._criteria import (
     ASYMMETRY_TOLERANCE,
     Bounds,
     certified_bounds,
-    certify,
     published_bounds,
 )
 from sealag.design._margins import LocalMargins, local_margins

@@ -9,12 +9,16 @@ from sealag.passivity._bounds import (
 from sealag.passivity._certificate import (
     Certificate,
     Criterion,
+    LocalLoop,
     Proof,
     Status,
+    Window,
     Worst,
+    content_digest,
     read_certificate,
     write_certificate,
 )
+from sealag.passivity._checks import Check, Verification
 from sealag.passivity._common import (
     CommonBound,
     max_delay_common,
@@ -43,7 +47,8 @@ from sealag.passivity._storage import (
     motor_storage,
     task_storage,
 )
-from sealag.passivity._verify import Check, Verification, verify
+from sealag.passivity._task_multipliers import task_multipliers
+from sealag.passivity._verify import verify
 
 __all__ = [
     "Certificate",
@@ -56,6 +61,7 @@ __all__ = [
     "DelayBound",
     "DelayStorage",
     "Factor",
+    "LocalLoop",
     "MultiplierProblem",
     "MultitaskBound",
     "PolytopeBound",
@@ -65,7 +71,9 @@ __all__ = [
     "Status",
     "TaskMultiplier",
     "Verification",
+    "Window",
     "Worst",
+    "content_digest",
     "delay_storage",
     "factorise",
     "joint_multiplier",
@@ -83,6 +91,7 @@ __all__ = [
     "read_certificate",
     "refuted_delay",
     "task_multiplier",
+    "task_multipliers",
     "task_storage",
     "verify",
     "write_certificate",

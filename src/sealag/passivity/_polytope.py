@@ -32,6 +32,8 @@ class PolytopeBound:
         W: (m, m) the multiplier; None if nothing was proven.
         windows: first and last instant of each window; neighbours share one.
         vertices: number of corners at which the inequality was checked.
+        boxes: centre and then half edges of each window's box, as (J* D^-½, D^-½ J*ᵀ S).
+        box_window: window that each of them belongs to.
         box: (K,) largest ‖[J*ᵀC, d J*ᵀS C^-ᵀ]‖₂ over each window's corners.
         ball: (K,) radius, in the same norm, of the ball added to the box so that all instants,
             and all between them if asked, lie inside; box + ball ≤ √2 is what proves the delay.
@@ -42,6 +44,8 @@ class PolytopeBound:
     W: Array | None
     windows: tuple[tuple[int, int], ...]
     vertices: int
+    boxes: MultiplierProblem
+    box_window: Array
     box: Array
     ball: Array
     reason: str
@@ -121,9 +125,11 @@ def max_delay_polytope_from_stiffness(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Windows:
-    """Corners of every window's box, and what sticks out of it."""
+    """Every window's box with its corners, and what sticks out of it."""
 
     edges: tuple[tuple[int, int], ...]
+    boxes: MultiplierProblem
+    box_window: Array
     corners: MultiplierProblem
     corner_window: Array
     rest: MultiplierProblem
@@ -160,6 +166,8 @@ def _polytope(
         W=W,
         windows=edges,
         vertices=len(A),
+        boxes=parts.boxes,
+        box_window=parts.box_window,
         box=box,
         ball=ball,
         reason="" if proven else f"nothing was proven ({words}); try shorter windows",
@@ -223,6 +231,16 @@ def _edges(count: int, window: int, breaks: Sequence[int]) -> tuple[tuple[int, i
     return tuple(found)
 
 
+def _boxed(points: Array, directions: int) -> tuple[Array, Array, Array]:
+    """Centre and half edges of a box along principal directions, and what it leaves of points."""
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2][:directions]
+    along = (points - middle) @ axes.T
+    low, high = along.min(axis=0), along.max(axis=0)
+    centre = middle + (low + high) / 2.0 @ axes
+    return centre, ((high - low) / 2.0)[:, None] * axes, points - middle - along @ axes
+
+
 def _windows(
     problem: MultiplierProblem,
     edges: tuple[tuple[int, int], ...],
@@ -243,17 +261,16 @@ def _windows(
         bend[1:-1] = (points[2:] - 2.0 * points[1:-1] + points[:-2]) / 8.0
         bend[list(breaks)] = bend[[at - 1 for at in breaks]] = 0.0
     corners, corner_window, rests, rest_window, bends = [], [], [], [], []
+    boxes, box_window = [], []
     for k, (first, last) in enumerate(edges):
-        here = points[first : last + 1]
-        middle = here.mean(axis=0)
-        axes = np.linalg.svd(here - middle, full_matrices=False)[2][:directions]
-        along = (here - middle) @ axes.T
-        low, high = along.min(axis=0), along.max(axis=0)
-        for choice in product((False, True), repeat=len(axes)):
-            corners.append(middle + np.where(choice, high, low) @ axes)
+        centre, half, rest = _boxed(points[first : last + 1], directions)
+        boxes += [centre, *half]
+        box_window += [k] * (1 + len(half))
+        for choice in product((-1.0, 1.0), repeat=len(half)):
+            corners.append(centre + np.array(choice) @ half)
             corner_window.append(k)
-        rests.append(here - middle - along @ axes)
-        rest_window += [k] * len(here)
+        rests.append(rest)
+        rest_window += [k] * len(rest)
         bends.append(bend[first : last + 1])
 
     def unpacked(rows: Array) -> MultiplierProblem:
@@ -266,6 +283,8 @@ def _windows(
 
     return _Windows(
         edges=edges,
+        boxes=unpacked(np.array(boxes)),
+        box_window=np.array(box_window),
         corners=unpacked(np.array(corners)),
         corner_window=np.array(corner_window),
         rest=unpacked(np.concatenate(rests)),

@@ -1,0 +1,258 @@
+"""The numbers that a certificate holds so that others can check it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.design._criteria import ASYMMETRY_TOLERANCE, PROOF_SHARE, Bounds
+from sealag.design._project import System
+from sealag.errors import SolverError
+from sealag.margin import delay_margin
+from sealag.passivity import (
+    Criterion,
+    LocalLoop,
+    Proof,
+    Window,
+    joint_multiplier,
+    max_delay_common_from_stiffness,
+    max_delay_polytope_from_stiffness,
+    task_multipliers,
+)
+from sealag.robot import Motion
+from sealag.typing import Array
+from sealag.whole_body import Feedback, Linearisation, StiffnessForm, WholeBodyStack, linearise
+
+POLYTOPE_WINDOW = 20
+"""Intervals between instants in one window of the time-varying bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Common:
+    """One multiplier for the whole motion.
+
+    Attributes:
+        delay: s.
+        W: (n, n) in joint coordinates; None if nothing was proven.
+        binding: instants that it was computed from.
+    """
+
+    delay: float
+    W: Array | None
+    binding: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moving:
+    """One multiplier for stiffnesses that vary inside polytopes around the motion.
+
+    Attributes:
+        delay: s.
+        W: (n, n) in joint coordinates; None if nothing was proven.
+        windows: the polytopes.
+    """
+
+    delay: float
+    W: Array | None
+    windows: tuple[Window, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Local:
+    """What is known of the frozen loop at one instant.
+
+    Attributes:
+        margin_s: exact delay margin, s; None if it could not be decided.
+        first_crossing_s: first delay at which roots cross, s; None likewise.
+        unstable: roots with positive real part without delay.
+        stable: whether the potential has a strict minimum; None where that has no meaning.
+        loop: the loop; None where the fed-back signal has none.
+    """
+
+    margin_s: float | None
+    first_crossing_s: float | None
+    unstable: int
+    stable: bool | None
+    loop: LocalLoop | None
+
+
+def common_multiplier(system: System, bounds: Bounds) -> Common:
+    """Bound with one multiplier for the whole motion.
+
+    Args:
+        system: the design.
+        bounds: of the certified criterion.
+    """
+    found = max_delay_common_from_stiffness(bounds.F, system.actuators.motor_damping)
+    return Common(delay=PROOF_SHARE * found.delay, W=_eased(found.W), binding=found.binding)
+
+
+def moving_multiplier(system: System, motion: Motion, bounds: Bounds) -> Moving:
+    """Bound for stiffnesses that vary inside polytopes around the motion, window by window.
+
+    Args:
+        system: the design.
+        motion: its instants.
+        bounds: of the certified criterion.
+    """
+    D = system.actuators.motor_damping
+    found = max_delay_polytope_from_stiffness(
+        bounds.F,
+        D,
+        window=POLYTOPE_WINDOW,
+        breaks=(np.flatnonzero(np.diff(motion.contact_index)) + 1).tolist(),
+    )
+    if found.W is None or not np.isfinite(found.delay):
+        return Moving(delay=found.delay, W=None, windows=())
+    sets = np.sqrt(D)[:, None] * found.boxes.M
+    windows = []
+    for k, (first, last) in enumerate(found.windows):
+        centre, *axes = sets[found.box_window == k]
+        windows.append(
+            Window(
+                first=first,
+                last=last,
+                centre=centre.tolist(),
+                axes=[axis.tolist() for axis in axes if axis.any()],
+                radius=float(found.ball[k]),
+            )
+        )
+    return Moving(delay=PROOF_SHARE * found.delay, W=_eased(found.W), windows=tuple(windows))
+
+
+def _eased(W: Array | None) -> Array | None:
+    """A multiplier of d for PROOF_SHARE d, where it leaves room in every direction.
+
+    ‖[JᵀC, d M C^-ᵀ]‖₂ ≤ √2 with s d and √s W, W = C Cᵀ, is smaller by s^¼ at least.
+    """
+    return None if W is None else math.sqrt(PROOF_SHARE) * W
+
+
+def worst_motion(system: System, bounds: Bounds, instant: int) -> Array:
+    """Motor velocities y in the motion that first turns the delayed loop active, (n,) complex.
+
+    y = D^-½ x with the eigenvector x of λ_max(cos φ S + i sin φ T), S + T = D^-½ F D^-½ its
+    symmetric and skew parts, at the φ where the numerical radius is reached.
+
+    Args:
+        system: the design.
+        bounds: of the criterion.
+        instant: the worst one.
+    """
+    root = 1.0 / np.sqrt(system.actuators.motor_damping)
+    A, phi = root[:, None] * bounds.F[instant] * root, bounds.angle[instant]
+    H = np.cos(phi) * (A + A.T) / 2.0 + 0.5j * np.sin(phi) * (A - A.T)
+    return root * np.linalg.eigh(H)[1][:, -1]
+
+
+def frozen_loop(system: System, motion: Motion, stack: WholeBodyStack, *, instant: int) -> Local:
+    """Exact local margin at an instant, and whether its potential has a minimum.
+
+    Args:
+        system: the design.
+        motion: its instants.
+        stack: the controller's matrices.
+        instant: which one.
+    """
+    F = stack.F_theta[instant]
+    if not np.isfinite(F).all():
+        return Local(margin_s=None, first_crossing_s=None, unstable=0, stable=None, loop=None)
+    frozen = linearise(
+        system.robot,
+        system.actuators,
+        motion.q[instant],
+        contacts=motion.contact_sets[motion.contact_index[instant]],
+        F=F,
+        feedback=system.feedback,
+    )
+    symmetric = stack.asymmetry[instant] <= ASYMMETRY_TOLERANCE
+    potential = symmetric and system.feedback is not Feedback.JOINT
+    stable = frozen.stable if potential else None
+    try:
+        margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries)
+    except SolverError:
+        values = np.linalg.eigvals(frozen.A_0 + frozen.A_1)
+        unstable = int((values.real > 1e-9 * np.abs(values).max()).sum())
+        return Local(
+            margin_s=0.0 if unstable else None,
+            first_crossing_s=None,
+            unstable=unstable,
+            stable=stable,
+            loop=_loop(system, frozen, math.nan),
+        )
+    return Local(
+        margin_s=float(margin.delay),
+        first_crossing_s=float(margin.first_crossing),
+        unstable=margin.unstable_roots,
+        stable=stable,
+        loop=_loop(system, frozen, margin.frequency),
+    )
+
+
+def _loop(system: System, frozen: Linearisation, frequency: float) -> LocalLoop:
+    half = len(frozen.A_0) // 2
+    return LocalLoop(
+        P=(-frozen.A_0[half:, :half]).tolist(),
+        R=(-frozen.A_0[half:, half:]).tolist(),
+        L=(-frozen.A_1[half:, :half]).tolist(),
+        symmetries=frozen.symmetries[:half].tolist(),
+        motor_inertia=system.actuators.shaped_inertia.tolist(),
+        spring_damping=system.actuators.spring_damping.tolist(),
+        frequency_rad_s=float(frequency),
+    )
+
+
+def instant_proofs(
+    system: System,
+    stack: WholeBodyStack,
+    bounds: Bounds,
+    *,
+    kind: Criterion,
+    count: int | None,
+    binding: tuple[int, ...],
+) -> tuple[Proof, ...]:
+    """Numbers to check for the instants with the smallest bounds, and for those that bind.
+
+    Args:
+        system: the design.
+        stack: the controller's matrices.
+        bounds: of the criterion.
+        kind: which criterion.
+        count: how many of the smallest bounds; None for all.
+        binding: instants that bind the common multiplier.
+    """
+    usable = (bounds.delay > 0.0) & np.isfinite(bounds.delay)
+    order = np.argsort(bounds.delay, kind="stable")
+    order = order[usable[order]]
+    extra = [k for k in binding if usable[k] and k not in set(order[:count].tolist())]
+    return tuple(
+        _proof(system, stack, bounds, kind=kind, instant=int(k)) for k in (*order[:count], *extra)
+    )
+
+
+def _proof(
+    system: System, stack: WholeBodyStack, bounds: Bounds, *, kind: Criterion, instant: int
+) -> Proof:
+    D, d, F = system.actuators.motor_damping, float(bounds.delay[instant]), bounds.F[instant]
+    published = kind is Criterion.PUBLISHED
+    force = system.hierarchy.form is StiffnessForm.FORCE
+    S = stack.stiffness[instant]
+    if published:
+        S = stack.K_x if force else stack.Lambda[instant] @ stack.K_x
+        form = StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED
+        levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
+        tasks = [(J[instant], Lambda[instant], K_x) for J, Lambda, K_x in levels]
+        found = task_multipliers(tasks, D, delay=d, form=form)
+        W = [(one.W + one.W.T) / 2.0 for one in found]
+    else:
+        W = [joint_multiplier(F, D, d)]
+    return Proof(
+        instant=instant,
+        delay_s=d,
+        J_star=stack.J_star[instant].tolist(),
+        stiffness=S.tolist(),
+        F_gravity=stack.F_gravity[instant].tolist(),
+        F=F.tolist(),
+        W=[block.tolist() for block in W],
+        Q=[(block / d).tolist() for block in W],
+    )

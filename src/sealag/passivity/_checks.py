@@ -1,0 +1,45 @@
+"""What a verification says."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One thing that was checked.
+
+    Attributes:
+        name: what it is.
+        ok: whether it holds.
+        detail: numbers, or what is wrong.
+    """
+
+    name: str
+    ok: bool
+    detail: str
+
+    def __post_init__(self) -> None:
+        """Keep a plain truth value, which JSON can say."""
+        object.__setattr__(self, "ok", bool(self.ok))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """Outcome of checking a certificate.
+
+    Attributes:
+        exact: whether inequalities were decided in rational arithmetic.
+        checks: everything that was checked.
+    """
+
+    exact: bool
+    checks: tuple[Check, ...]
+
+    @property
+    def valid(self) -> bool:
+        """Whether every check holds: then what the file says follows from its numbers."""
+        return all(check.ok for check in self.checks)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Return the outcome as plain data with the key `valid`."""
+        return {"valid": self.valid, **asdict(self)}

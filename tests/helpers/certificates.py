@@ -1,0 +1,71 @@
+"""Certificates to verify, and to forge."""
+
+import copy
+import functools
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import sealag
+from sealag.errors import CertificateError
+from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+from sealag.passivity import content_digest, read_certificate, verify, write_certificate
+from sealag.robot import Motion
+
+
+def plain(certificate: Any) -> dict[str, Any]:
+    """What a certificate says once written and read again."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "c.json"
+        write_certificate(certificate, path)
+        return read_certificate(path)
+
+
+@functools.cache
+def _made(name: str) -> dict[str, Any]:
+    if name == "moving":
+        return plain(_moving())
+    if name == "crawl":
+        return plain(
+            sealag.certify(sealag.load("examples/anymal_crawl.toml"), criterion="published")
+        )
+    return plain(sealag.certify(sealag.load("examples/baxter.toml")))
+
+
+def made(name: str) -> dict[str, Any]:
+    """A fresh copy: baxter (one instant), moving (half a step of Hume, with multipliers for all of
+    it), crawl (two priority levels, published)."""
+    return copy.deepcopy(_made(name))
+
+
+def _moving() -> Any:
+    system = sealag.load("bundled:hume")
+    whole = walk_motion(system.robot, plan_walk(paper_terrain(), steps=2), rate=100.0)
+    part = slice(0, 40)
+    motion = Motion(
+        time=whole.time[part],
+        q=whole.q[part],
+        v=whole.v[part],
+        contact_sets=whole.contact_sets,
+        contact_index=whole.contact_index[part],
+    )
+    return sealag.certify(system, motion, time_varying=True)
+
+
+def without_loop(data: dict[str, Any]) -> dict[str, Any]:
+    """The same without any claim about the frozen loop."""
+    nothing = ("local_loop", "local_margin_s", "first_crossing_s", "stable", "conservatism")
+    return {**data, **dict.fromkeys(nothing), "unstable_modes": 0}
+
+
+def resealed(data: dict[str, Any]) -> dict[str, Any]:
+    """The same with a digest that agrees, as a forger would write it."""
+    return {**data, "hashes": {**data["hashes"], "content": content_digest(data)}}
+
+
+def failures(data: dict[str, Any], *, exact: bool = False) -> list[str]:
+    """Names of the checks that fail although the digest agrees."""
+    try:
+        return [check.name for check in verify(resealed(data), exact=exact).checks if not check.ok]
+    except CertificateError as error:
+        return [f"unreadable: {error}"]
