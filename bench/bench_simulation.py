@@ -1,22 +1,60 @@
-"""Hume standing with springs, contact, delays and audit: steps per second beside mj_step."""
+"""Hume with its whole-body controllers, springs, contact, delays and audit, beside mj_step."""
 
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
+import sealag
 from sealag.actuation import actuators
-from sealag.delay import Delays, Sinusoid
-from sealag.robot import Contact, load_robot
-from sealag.simulation import Clock, Foot, Network, Scene, closed_loop
+from sealag.robot import load_robot
+from sealag.simulation import Run
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 FEET = ("left_foot", "right_foot")
+STEP = 1e-3  # s, of both simulators and of the controllers
+REPEATS = 5
 
 
-def _hume():
+def _fastest(call: Callable[[], float]) -> float:
+    """Processor seconds for a simulated second, the best of some runs after a first one."""
+    call()
+    costs = []
+    for _ in range(REPEATS):
+        start = time.process_time()
+        simulated = call()
+        costs.append((time.process_time() - start) / simulated)
+    return min(costs)
+
+
+def ours(scenario: str, duration: float | None = None) -> tuple[float, Run]:
+    """Processor seconds for a second of Hume in a scenario of the bundled project, and a run.
+
+    Args:
+        scenario: such as "walk" or "regulate".
+        duration: simulated time, s; the scenario's own if None.
+    """
+    system, runs = sealag.load("bundled:hume"), []
+
+    def simulate() -> float:
+        runs.append(sealag.simulate(system, scenario=scenario, duration=duration))
+        return float(runs[-1].time[-1])
+
+    return _fastest(simulate), runs[-1]
+
+
+def theirs(step: float, duration: float = 1.0) -> float:
+    """Processor seconds for a second of mj_step on Hume with springs, both feet held.
+
+    Args:
+        step: MuJoCo's step, s.
+        duration: simulated time, s.
+    """
+    from helpers.mujoco_sea import MujocoRobot
+
     robot = load_robot("bundled:hume.urdf", floating_base=True)
     springs = actuators(
         robot.joints,
@@ -27,72 +65,35 @@ def _hume():
     )
     q = robot.configuration(np.deg2rad([0, -25, 55, 0, -25, 55]))
     q[2] -= robot.frame_placement(FEET[0], q)[1][2]
-    return robot, springs, q
-
-
-def ours(step: float, duration: float = 1.0) -> float:
-    """Seconds of wall clock for a second of Hume with everything but a whole-body controller.
-
-    Args:
-        step: physics step, s; the central loop runs at 1 kHz.
-        duration: simulated time, s.
-    """
-    from helpers.controllers import JointPD
-
-    robot, springs, q = _hume()
-    delays = Delays(
-        central=Sinusoid(mean=0.02, amplitude=0.01, angular_frequency=1.0),
-        embedded=Sinusoid(mean=0.003, amplitude=0.002, angular_frequency=1.0),
-    )
-    feet = [
-        Foot(contact=Contact(frame=foot), torsional_damping=3.0, torsional_radius=0.01)
-        for foot in FEET
-    ]
-    start = time.perf_counter()
-    closed_loop(
-        robot,
-        springs,
-        JointPD(q[-6:], stiffness=100.0, damping=2.0),
-        q=q,
-        duration=duration,
-        network=Network.from_delays(delays),
-        clock=Clock(physics=step, central=1e-3),
-        scene=Scene(feet=feet, fall=None),
-    )
-    return (time.perf_counter() - start) / duration
-
-
-def theirs(step: float, duration: float = 1.0) -> float:
-    """Seconds of wall clock for a second of mj_step on the same model, both feet held.
-
-    Args:
-        step: MuJoCo's step, s.
-        duration: simulated time, s.
-    """
-    from helpers.mujoco_sea import MujocoRobot
-
-    robot, springs, q = _hume()
     twin = MujocoRobot.build(robot, springs, step=step, feet=FEET, delay=0.015)
-    twin.write(q, np.zeros(robot.nv), q[-6:], np.zeros(6))
-    for foot in FEET:
-        twin.hold(foot)
-    start = time.perf_counter()
-    for _ in range(round(duration / step)):
-        mujoco.mj_step(twin.model, twin.data)
-    return (time.perf_counter() - start) / duration
+
+    def simulate() -> float:
+        twin.write(q, np.zeros(robot.nv), q[-6:], np.zeros(6))
+        for foot in FEET:
+            twin.hold(foot)
+        for _ in range(round(duration / step)):
+            mujoco.mj_step(twin.model, twin.data)
+        return duration
+
+    return _fastest(simulate)
 
 
 def run() -> None:
-    """Print both, and their ratio at equal step and at equal error (see the oracle's table)."""
-    ours(1e-3, 0.05)
-    for step in (1e-3, 5e-4):
-        mine, peer = ours(step), theirs(step)
-        fine = theirs(step / 16)
+    """Print every scenario as multiples of real time and of mj_step in the same run."""
+    print("\nHume at 1 kHz: control, springs, contact, delay lines and energy audit, one processor")
+    peer, fine = theirs(STEP), theirs(STEP / 16)
+    for title, scenario, duration in (
+        ("walking controller, 7 steps", "walk", None),
+        ("whole-body Controller, standing", "regulate", 1.0),
+    ):
+        cost, result = ours(scenario, duration)
         print(
-            f"Hume, step {step * 1e3:g} ms: {1 / mine:.1f} x real time "
-            f"({1 / mine / step:.0f} steps/s) with contact, delay and audit; mj_step alone is "
-            f"{mine / peer:.1f} times as fast, and at 1/16 of the step, where its error is still "
-            f"larger, {mine / fine:.2f} times"
+            f"  {title:35}{1 / cost:5.1f} x real time ({cost * STEP * 1e6:4.0f} µs a step; "
+            f"{result.outcome.value} at {result.time[-1]:.2f} s)"
+        )
+        print(
+            f"  {'':35}mj_step alone, no control, delay or audit: {cost / peer:.1f} x as fast;"
+            f"\n  {'':35}at 1/16 of the step, where its error is still larger: {cost / fine:.2f} x"
         )
 
 

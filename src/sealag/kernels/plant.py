@@ -1,56 +1,98 @@
-"""Plant kernel: the fourth-order Runge-Kutta step of links, motors and contacts between calls of
-the robot's dynamics.
+"""Plant kernel: the fourth-order Runge-Kutta step of links, motors and contacts, in five parts
+between which the robot's terms are evaluated.
 """
 
 import numpy as np
 from numba import njit
 
 from sealag.kernels import motor, rigid
-from sealag.kernels.contact import example, motion
+from sealag.kernels.contact import evaluate, example, motion
 
 
 @njit(cache=True)
-def advance(k, now, stage, following, sizes, memory, motors, step, regular, book):
-    """Do what lies between two evaluations of the dynamics in a step.
+def memory_size(nv, n):
+    """Return how many numbers the parts of a step share, see `advance`."""
+    return 8 * nv + 20 + 4 * n + nv + 7 * n
 
-    A step is four calls, k = 0 … 3, each but the last followed by the robot's terms and
-    ``contact.evaluate`` of the stage. The first predicts the motors, the second to fourth keep
-    what the stage was evaluated to; the first three move to the next stage, the last to the end.
+
+@njit(cache=True)
+def shared(memory, nv, n):
+    """Return the named parts of a step's memory.
+
+    Rates (4, nv), accelerations (4, nv) and powers (4, 5) of the stages, motor angles and speeds
+    half a step and a step ahead (n, 2, 2), a displacement (nv,), and the joints' works (n, 7).
+    """
+    ends = 8 * nv + 20, 8 * nv + 20 + 4 * n, 9 * nv + 20 + 4 * n
+    return (
+        memory[: 4 * nv].reshape(4, nv), memory[4 * nv : 8 * nv].reshape(4, nv),
+        memory[8 * nv : ends[0]].reshape(4, 5), memory[ends[0] : ends[1]].reshape(n, 2, 2),
+        memory[ends[1] : ends[2]], memory[ends[2] :].reshape(n, 7),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def advance(
+    k, terms, around, state, rates, now, stage, following, sizes, memory, motors, step, regular,
+    book,
+):  # fmt: skip
+    """Do one of the five parts of a step.
+
+    Part 0 predicts the motors and moves to the first stage. Parts 1 to 3 take the terms of the
+    stage, evaluate it and move on, the third to the step's end. Part 4 evaluates the end.
 
     Args:
-        k: number of the call.
+        k: number of the part.
+        terms: of the stage or the end, as `sealag.robot.Workspace.terms`.
+        around: what surrounds the robot, as in ``contact.evaluate``.
+        state: closed and yielding (P,).
+        rates: stabilisation rate 1/s, time in which friction may stop a point s.
         now: memory of the step's beginning, as in ``contact.parts``, evaluated.
         stage: memory of the stage, written; of z angles and speeds only.
-        following: memory of the step's end, written: q, v and z.
+        following: memory of the step's end, written.
         sizes: as in ``contact.parts``.
-        memory: what the calls of a step share: rates (4, nv), accelerations (4, nv) and powers
-            (4, 5) of the stages, motor angles and speeds half a step and a step ahead (n, 2, 2), a
-            displacement (nv,) and the joints' works (n, 7).
+        memory: what the parts share, as in `shared`.
         motors: parameters, whether torque feedback is not delayed (1.0), command (n,) and known
             spring torque (n,), and the tables over half a step, a step, and of works.
         step: s.
         regular: whether the step is as long as the tables' one.
         book: whether to write the works.
+
+    Returns:
+        False if the instant has no solution.
     """
+    if k == 4:
+        return evaluate(terms, around, state, rates, motors[0], following, sizes)
+    if k > 0 and not evaluate(terms, around, state, rates, motors[0], stage, sizes):
+        return False
     q, v, z, acceleration, power = motion(now, sizes)
-    rates, accelerations, powers, ahead, u, _ = memory
+    n = z.shape[0]
+    parts = shared(memory, v.size, n)
+    speeds, accelerations, powers, ahead, u, _ = parts
     if k == 0:
         _predict_motors(q, v, z, acceleration, motors, step, regular, motion(following, sizes)[2],
                         ahead)  # fmt: skip
-        rates[0], accelerations[0], powers[0] = v, acceleration, power
+        speeds[0], accelerations[0], powers[0] = v, acceleration, power
     else:
         accelerations[k], powers[k] = motion(stage, sizes)[3:]
     if k == 3:
-        _close(q, v, z, motion(following, sizes)[:3], memory, motors, step, regular, book)
-        return
+        _close(q, v, z, motion(following, sizes)[:3], parts, motors, step, regular, book)
+        return True
     there_q, there_v, there_z = motion(stage, sizes)[:3]
-    n = z.shape[0]
     rigid.stage(
-        q, v, rates[k], accelerations[k], step if k == 2 else 0.5 * step, v.size - n, u, there_q,
-        there_v, rates[k + 1],
+        q, v, speeds[k], accelerations[k], step if k == 2 else 0.5 * step, v.size - n, u, there_q,
+        there_v, speeds[k + 1],
     )  # fmt: skip
     for i in range(n):
         there_z[i, 0], there_z[i, 1] = ahead[i, k // 2, 0], ahead[i, k // 2, 1]
+    return True
+
+
+@njit(cache=True)
+def book_step(now, following, sizes, memory, motors, step):
+    """Move links and motors to the end of an irregular step once more, and write its works."""
+    q, v, z = motion(now, sizes)[:3]
+    parts = shared(memory, v.size, z.shape[0])
+    _close(q, v, z, motion(following, sizes)[:3], parts, motors, step, False, True)
 
 
 @njit(cache=True)
@@ -69,13 +111,13 @@ def _predict_motors(q, v, z, acceleration, motors, step, regular, ahead_z, ahead
 
 
 @njit(cache=True)
-def _close(q, v, z, end, memory, motors, step, regular, book):
+def _close(q, v, z, end, parts, motors, step, regular, book):
     """Move the links to the step's end, and the motors along the links' cubic; book if asked to."""
     parameters, instant, tau_osc, tau_measured, _, whole, forms = motors
     end_q, end_v, end_z = end
-    n, work = z.shape[0], memory[5]
+    n, work = z.shape[0], parts[5]
     base = v.size - n
-    rigid.combine(q, v, memory[0], memory[1], step, base, end_q, end_v)
+    rigid.combine(q, v, parts[0], parts[1], step, base, end_q, end_v)
     end_z[:] = z
     motor.link_cubic(end_z, q[q.size - n :], v[base:], end_q[q.size - n :], end_v[base:], step)
     work[:] = 0.0
@@ -86,12 +128,15 @@ def _close(q, v, z, end, memory, motors, step, regular, book):
 
 def warm() -> None:
     """Compile every kernel with the types used in practice."""
-    _, _, _, _, parameters, now, sizes = example()
+    terms, around, state, rates, parameters, now, sizes = example()
     nv, n = 7, 1
-    memory = (
-        np.zeros((4, nv)), np.zeros((4, nv)), np.zeros((4, 5)), np.zeros((n, 2, 2)), np.zeros(nv),
-        np.zeros((n, 7)),
-    )  # fmt: skip
+    memory = np.zeros(memory_size(nv, n))
+    shared(memory, nv, n)
     tables = (np.zeros((n, 4, 9, 9)), np.zeros((n, 4, 9, 9)), np.zeros((n, 4, 5, 9, 9)))
     motors = (parameters, 1.0, np.zeros(n), np.zeros(n), *tables)
-    advance(0, now, now.copy(), now.copy(), sizes, memory, motors, 1e-3, True, True)
+    stage, following = now.copy(), now.copy()
+    advance(
+        0, terms, around, state, rates, now, stage, following, sizes, memory, motors, 1e-3, True,
+        True,
+    )  # fmt: skip
+    book_step(now, following, sizes, memory, motors, 1e-3)

@@ -10,6 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
+GRAVITY = 9.81  # m/s², as in Pinocchio's models
+
 
 @njit(cache=True)
 def _cross(a, b, out):
@@ -135,6 +137,8 @@ def frames(terms, mounts, J, R, p, bias):
             x, y, z = R_joint[j, i, 0], R_joint[j, i, 1], R_joint[j, i, 2]
             p[f, i] = p_joint[j, i] + (x * position[f, 0] + y * position[f, 1] + z * position[f, 2])
             bias[f, i] = x * (a[0] + t[0]) + y * (a[1] + t[1]) + z * (a[2] + t[2])
+            if i == 2:
+                bias[f, i] -= GRAVITY
             bias[f, 3 + i] = x * rate[j, 3] + y * rate[j, 4] + z * rate[j, 5]
             for c in range(3):
                 R[f, i, c] = x * rotation[f, 0, c] + y * rotation[f, 1, c] + z * rotation[f, 2, c]

@@ -183,6 +183,7 @@ class WalkingController:
             measured=measurement.time, now=now,
         )  # fmt: skip
         body.update()
+        body.update_com_bias()
         if options.prediction == Prediction.NONE:
             self._estimator.tau_sea[:] = measurement.tau_sea
 

@@ -38,8 +38,11 @@ class Body:
         self.com = at.com, at.com_velocity, at.com_bias(), at.com_jacobian()
 
     def update(self) -> None:
-        """Evaluate the terms at ``q`` and ``v``."""
+        """Evaluate the terms at ``q`` and ``v``, but for the acceleration in ``com``."""
         self._workspace.update(self.q, self.v)
+
+    def update_com_bias(self) -> None:
+        """Evaluate the acceleration in ``com`` too."""
         self._workspace.com_bias()
 
     def gravity(self) -> Array:

@@ -1,7 +1,7 @@
 """Success tables of the walk: terrains, gains, delays, and every means left out once."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -113,14 +113,19 @@ def _walk(project: str, case: WalkCase) -> Walk:
 def _summary(walk: Walk) -> Walk:
     """Drop what a table does not need, so that processes exchange little."""
     empty = np.zeros((0, 3))
-    short = {
-        name: getattr(walk.run, name)[:0]
-        for name in (
-            "time", "q", "v", "theta", "theta_dot", "tau_sea", "tau_motor", "tau_command",
-            "tau_osc", "measurement_age", "command_age", "contact_mode", "contact_force",
-        )
-    }  # fmt: skip
-    return replace(walk, run=replace(walk.run, **short, events=()), com=empty, task=empty)
+    return replace(walk, run=replace(_emptied(walk.run), events=()), com=empty, task=empty)
+
+
+def _emptied(value: Any) -> Any:
+    """Return a value whose arrays, at any depth, have no rows."""
+    if isinstance(value, np.ndarray):
+        return value[:0].copy()
+    if isinstance(value, dict):
+        return {key: _emptied(part) for key, part in value.items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = {part.name: _emptied(getattr(value, part.name)) for part in fields(value)}
+        return replace(value, **parts)
+    return value
 
 
 def rough_terrains(

@@ -27,8 +27,8 @@ class Workspace:
         momentum: centroidal momentum (6,): linear, then angular about the centre of mass.
         terms: what compiled kernels take, live like the rest: M, nle, the joints' spatial
             Jacobian (nv, 6) about the world's origin, and of every joint its rotation (N, 3, 3),
-            position (N, 3), spatial velocity (N, 6) and acceleration at zero v̇ (N, 6), both in its
-            own axes. `sealag.kernels.rigid.frames` makes frames of them.
+            position (N, 3), spatial velocity (N, 6) and, less gravity's, acceleration at zero v̇
+            (N, 6), both in its own axes. `sealag.kernels.rigid.frames` makes frames of them.
     """
 
     def __init__(self, model: Any, *, nv_base: int) -> None:
@@ -44,7 +44,7 @@ class Workspace:
         self._frames: dict[str, tuple[int, Array, Array]] = {}
         self.nv = nv = int(model.nv)
         self.nv_base = nv_base
-        self._q = pin.neutral(model)
+        self._q, self._v = pin.neutral(model), self._zero
         data = self._data
         self.M: Array = data.M.reshape(nv, nv)
         self.nle: Array = data.nle
@@ -60,20 +60,19 @@ class Workspace:
             _stacked([placement.rotation for placement in data.oMi]),
             _stacked([placement.translation for placement in data.oMi]),
             _stacked([twist.vector for twist in data.v]),
-            _stacked([twist.vector for twist in data.a]),
+            _stacked([twist.vector for twist in data.a_gf]),
         )
 
     def update(self, q: Array, v: Array) -> None:
-        """Evaluate everything at a configuration and velocity.
+        """Evaluate everything at a configuration and velocity, which are kept, not copied.
 
         Args:
             q: (nq,) configuration.
             v: (nv,) velocity.
         """
         model, data = self._model, self._data
-        self._q = q
+        self._q, self._v = q, v
         pin.computeAllTerms(model, data, q, v)
-        pin.forwardKinematics(model, data, q, v, self._zero)
 
     @property
     def kinetic_energy(self) -> float:
@@ -103,7 +102,9 @@ class Workspace:
 
     def com_bias(self) -> Array:
         """Return the acceleration (3,) of the centre of mass at zero joint acceleration."""
-        pin.centerOfMass(self._model, self._data, pin.KinematicLevel.ACCELERATION)
+        model, data = self._model, self._data
+        pin.forwardKinematics(model, data, self._q, self._v, self._zero)
+        pin.centerOfMass(model, data, pin.KinematicLevel.ACCELERATION)
         return self._com_acceleration
 
     def centroidal_map(self) -> Array:
@@ -144,8 +145,10 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
+        model, data = self._model, self._data
+        pin.forwardKinematics(model, data, self._q, self._v, self._zero)
         return pin.getFrameClassicalAcceleration(
-            self._model, self._data, self._frame(frame)[0], _WORLD_ALIGNED
+            model, data, self._frame(frame)[0], _WORLD_ALIGNED
         ).vector
 
     def _frame(self, name: str) -> tuple[int, Array, Array]:

@@ -9,6 +9,7 @@ kernels.contact), torque and velocity limits and Coulomb stick, which act from a
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -104,11 +105,9 @@ class Plant:
         )
         motor.tables(self._parameters, self._instant, step, *self._tables)
         self._now, self._next, self._stage = (Instant(self._sizes) for _ in range(3))
-        self._powers, self._work = np.zeros((4, 5)), np.zeros((n, 7))
-        self._memory = (
-            np.zeros((4, nv)), np.zeros((4, nv)), self._powers, np.zeros((n, 2, 2)), np.zeros(nv),
-            self._work,
-        )  # fmt: skip
+        self._memory = np.zeros(plant.memory_size(nv, n))
+        parts = plant.shared(self._memory, nv, n)
+        self._powers, self._work = parts[2], parts[5]
         self.load = self.contacts.load
         self.ledger = Ledger(self._parameters)
         self.impulse = np.zeros((self.contacts.count, 3))
@@ -237,27 +236,29 @@ class Plant:
 
     def _try(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
         """Fill the next instant with the state one step ahead in the present contact modes."""
-        following, motors = self._next, self._motors(tau_osc, measured)
-        for k in (0, 1, 2):
-            self._advance(k, motors, step, regular, False)
-            self._evaluate(self._stage)
-        self._advance(3, motors, step, regular, regular)
-        self._evaluate(following)
+        following, workspace, contacts = self._next, self._workspace, self.contacts
+        motors = self._motors(tau_osc, measured)
+        for k in range(5):
+            at = following if k == 4 else self._stage
+            if k > 0:
+                workspace.update(at.q, at.v)
+            solved = self._kernel.advance(
+                k, workspace.terms, contacts.around, contacts.state, contacts.rates,
+                self._now.data, self._stage.data, following.data, self._sizes, self._memory,
+                motors, step, regular, regular,
+            )  # fmt: skip
+            if not solved:
+                raise self._unsolvable(at)
+        following.potential = workspace.potential_energy
         if not math.isfinite(following.power[4]):
             raise PlantStop(
                 Outcome.DIVERGED, f"velocities are not finite after t = {self.time:.4f} s"
             )
-        self.contacts.measure_gaps(following)
+        contacts.measure_gaps(following)
 
-    def _motors(self, tau_osc: Array, measured: Array) -> tuple:
+    def _motors(self, tau_osc: Array, measured: Array) -> tuple[Any, ...]:
         half, whole, forms = self._tables
         return self._parameters, self._instant, tau_osc, measured, half, whole, forms
-
-    def _advance(self, k: int, motors: tuple, step: float, regular: bool, book: bool) -> None:
-        self._kernel.advance(
-            k, self._now.data, self._stage.data, self._next.data, self._sizes, self._memory,
-            motors, step, regular, book,
-        )  # fmt: skip
 
     def _evaluate(self, at: Instant) -> None:
         """Evaluate an instant's dynamics and contact forces at its q, v and z."""
@@ -269,16 +270,22 @@ class Plant:
             at.data, self._sizes,
         )  # fmt: skip
         if not solved:
-            tame = float(np.abs(at.v).max()) < FASTEST
-            raise PlantStop(
-                Outcome.CONTACT_UNSOLVABLE if tame else Outcome.DIVERGED,
-                f"the equations of motion have no solution after t = {self.time:.4f} s",
-            )
+            raise self._unsolvable(at)
+
+    def _unsolvable(self, at: Instant) -> PlantStop:
+        tame = float(np.abs(at.v).max()) < FASTEST
+        return PlantStop(
+            Outcome.CONTACT_UNSOLVABLE if tame else Outcome.DIVERGED,
+            f"the equations of motion have no solution after t = {self.time:.4f} s",
+        )
 
     def _accept(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
         """Take the next instant for the present one, and book the step."""
         if not regular:
-            self._advance(3, self._motors(tau_osc, measured), step, regular, True)
+            self._kernel.book_step(
+                self._now.data, self._next.data, self._sizes, self._memory,
+                self._motors(tau_osc, measured), step,
+            )  # fmt: skip
         self._now, self._next = self._next, self._now
         self.ledger.add(self._work, self._powers, step, self._now)
         self.time += step
