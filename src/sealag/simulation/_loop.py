@@ -20,6 +20,7 @@ from sealag.typing import Array
 from sealag.whole_body import Measurement, StoringController, TickController
 
 _WATCH = 5e-3  # s between two looks for a fall
+_LONGEST = 100.0  # rad: a spring deflection beyond any physical range
 
 
 def closed_loop(
@@ -122,7 +123,7 @@ class _Loop:
         self._open_lines(network, n)
         self._storing = controller if isinstance(controller, StoringController) else None
         self._pushes = [(frames.index(push.frame), push) for push in scene.pushes]
-        self._fall_height, self._upright = -np.inf, np.zeros(3)
+        self._fall_height, self._upright = -np.inf, (0.0, 0.0, 1.0)
 
     def _open_lines(self, network: Network, n: int) -> None:
         clock = self.clock
@@ -252,19 +253,18 @@ class _Loop:
 
     def _sense(self, t: float) -> None:
         truth, plant = self.truth, self.plant
-        truth.data[0] = t
-        truth.q[:] = plant.q
-        truth.v[:] = plant.v
-        truth.theta[:] = plant.theta
-        truth.theta_dot[:] = plant.theta_dot
+        moving = self.robot.nq + self.robot.nv
+        truth.data[0], truth.data[1 : 1 + moving] = t, plant.instant.row[:moving]
+        truth.theta[:], truth.theta_dot[:] = plant.theta, plant.theta_dot
         truth.tau_sea[:] = plant.tau_sea
         plant.contacts.loaded(truth.contact)
 
     def _watch(self) -> None:
         """End the run when the robot has fallen or left any physical range."""
         plant = self.plant
-        stretch = float(np.abs(plant.theta - plant.q[-self.robot.n :]).max(initial=0.0))
-        if not (float(np.abs(plant.v).max(initial=0.0)) < FASTEST and stretch < 100.0):
+        joints = plant.q[-self.robot.n :].tolist()
+        tame = all(abs(a - b) < _LONGEST for a, b in zip(plant.theta.tolist(), joints))
+        if not (tame and all(abs(speed) < FASTEST for speed in plant.v.tolist())):
             raise PlantStop(
                 Outcome.DIVERGED,
                 f"velocities or spring deflections left any physical range at t = "
@@ -272,7 +272,8 @@ class _Loop:
             )
         if self._fall_height > -np.inf and self.scene.fall is not None:
             height = self._base_height()
-            tilt = math.acos(min(1.0, float(_vertical(plant.q) @ self._upright)))
+            along = sum(a * b for a, b in zip(_vertical(plant.q), self._upright))
+            tilt = math.acos(min(1.0, along))
             if height < self._fall_height or tilt > self.scene.fall.tilt:
                 raise PlantStop(
                     Outcome.FELL,
@@ -347,7 +348,7 @@ class _Loop:
         )
 
 
-def _vertical(q: Array) -> Array:
-    """Return the base's z axis in the world (3,)."""
+def _vertical(q: Array) -> tuple[float, float, float]:
+    """Return the base's z axis in the world."""
     x, y, z, w = q[3:7].tolist()
-    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
