@@ -3,6 +3,7 @@
 import copy
 import functools
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from sealag.errors import CertificateError
 from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.passivity import content_digest, read_certificate, verify, write_certificate
 from sealag.robot import Motion
+from sealag.whole_body import Feedback
 
 
 def plain(certificate: Any) -> dict[str, Any]:
@@ -25,6 +27,20 @@ def plain(certificate: Any) -> dict[str, Any]:
 def _made(name: str) -> dict[str, Any]:
     if name == "moving":
         return plain(_moving())
+    if name == "one foot":
+        system = sealag.load("bundled:hume")
+        return plain(
+            sealag.certify(
+                replace(
+                    system,
+                    feedback=Feedback.STATIC_JOINT_TANK,
+                    contacts=system.contacts[:1],
+                    actuators=replace(
+                        system.actuators, spring_stiffness=10.0 * system.actuators.spring_stiffness
+                    ),
+                )
+            )
+        )
     if name == "crawl":
         return plain(
             sealag.certify(sealag.load("examples/anymal_crawl.toml"), criterion="published")
@@ -34,7 +50,7 @@ def _made(name: str) -> dict[str, Any]:
 
 def made(name: str) -> dict[str, Any]:
     """A fresh copy: baxter (one instant), moving (half a step of Hume, with multipliers for all of
-    it), crawl (two priority levels, published)."""
+    it), crawl (two priority levels, published), one foot (Hume, free to turn about it)."""
     return copy.deepcopy(_made(name))
 
 

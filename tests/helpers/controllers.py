@@ -37,7 +37,8 @@ class JointPD:
 class StoringPD(JointPD):
     """Motor-side stiffness whose potential is known."""
 
-    def storage(self, t, measurement):
-        """Return V_3."""
+    def storage(self, t, measurement, command):
+        """Return V_3 and write the undelayed command."""
+        self.tick(t, measurement, command)
         away = measurement.theta - self.target
         return float(0.5 * self.stiffness * away @ away)

@@ -24,8 +24,9 @@ class MotorStiffness:
         """Write the command."""
         out[:] = self.F @ (self.target - measurement.theta)
 
-    def storage(self, t, measurement):
-        """Return V_3."""
+    def storage(self, t, measurement, command):
+        """Return V_3 and write the undelayed command."""
+        self.tick(t, measurement, command)
         away = measurement.theta - self.target
         return float(0.5 * away @ self.F @ away)
 

@@ -28,6 +28,7 @@ from sealag.whole_body import (
     TaskKind,
     TickController,
     evaluate,
+    passive_stiffness,
     relative_asymmetry,
 )
 
@@ -168,37 +169,59 @@ def test_one_level_runs_the_same_with_either_error(contacts):
     np.testing.assert_array_equal(out, plain)
 
 
-def response_to_free_motions(system, contacts):
-    """‖∂(command)/∂z‖ along motions that the contacts allow, with θ held."""
-    robot, measured = system.robot, at_posture(system)
+def response_to_free_motions(system, contacts, **options):
+    """−∂(command)/∂z (n, k) along motions Z (nv, k) that the contacts allow, with θ held; and Z."""
+    robot = system.robot
     J_s = robot.contact_jacobian(contacts, system.posture)
-    Z = np.linalg.svd(J_s)[2][np.linalg.matrix_rank(J_s) :]
-    controller, out, rows = build(system, contacts), np.zeros(robot.n), []
-    for z in Z:
-        row = np.zeros(robot.n)
+    Z = np.linalg.svd(J_s)[2][np.linalg.matrix_rank(J_s) :].T
+    controller, out = build(system, contacts, static_iterations=20, **options), np.zeros(robot.n)
+    still = certified(system, contacts, **{k: options[k] for k in ("gravity",) if k in options})
+    measured, response = without_errors(system, controller, still), np.zeros((robot.n, Z.shape[1]))
+    rest = measured.data.copy()
+    for j, z in enumerate(Z.T):
         for sign in (1.0, -1.0):
-            measured.q[:] = system.posture
+            measured.data[:] = rest
             controller.reset(0.0, measured)
             measured.q[:] = robot.integrate(system.posture, sign * 1e-5 * z)
             controller.tick(0.0, measured, out)
-            row += sign * out / 2e-5
-        rows.append(row)
-    return np.linalg.norm(rows, 2)
+            response[:, j] -= sign * out / 2e-5
+    return response, Z
 
 
 def test_command_depends_on_motor_angles_alone_where_they_say_where_the_robot_is():
     """On four feet it does; on one foot three motions are passive, and x answers to them too."""
-    assert response_to_free_motions(ANYMAL, ANYMAL.contacts) < 1e-5
-    assert response_to_free_motions(HUME, ONE_FOOT) > 10.0
+    assert np.linalg.norm(response_to_free_motions(ANYMAL, ANYMAL.contacts)[0], 2) < 1e-5
+    assert np.linalg.norm(response_to_free_motions(HUME, ONE_FOOT)[0], 2) > 10.0
+
+
+@pytest.mark.parametrize("gravity", list(GravityCompensation))
+@pytest.mark.parametrize(
+    ("feet", "feedback"), [(1, Feedback.MOTOR), (1, Feedback.STATIC_JOINT), (2, Feedback.MOTOR)]
+)
+def test_passive_stiffness_is_the_response_to_passive_motions(feet, feedback, gravity):
+    """One point foot leaves three passive motions, two leave one."""
+    contacts = ONE_FOOT if feet == 1 else HUME.contacts
+    response, Z = response_to_free_motions(HUME, contacts, feedback=feedback, gravity=gravity)
+    F = passive_stiffness(
+        HUME.robot, HUME.hierarchy, HUME.actuators, q=HUME.posture, contacts=contacts,
+        feedback=feedback, gravity=gravity,
+    )  # fmt: skip
+    np.testing.assert_allclose(F @ Z, response, atol=1e-5 * np.abs(response).max())
+    assert np.abs(response).max() > 1.0
 
 
 # The potential ---------------------------------------------------------------------------------
-def gradient(storage, measured, step=1e-4):
+def stored(controller, measured, t=0.0):
+    """V_3 and the tank; the command that comes with it is dropped."""
+    return controller.storage(t, measured, np.zeros(len(measured.theta)))
+
+
+def gradient(controller, measured, step=1e-4):
     found = np.zeros(len(measured.theta))
     for j in range(len(found)):
         for sign in (1.0, -1.0):
             measured.theta[j] += sign * step
-            found[j] += sign * storage(0.0, measured) / (2.0 * step)
+            found[j] += sign * stored(controller, measured) / (2.0 * step)
             measured.theta[j] -= sign * step
     return found
 
@@ -223,8 +246,11 @@ def test_storage_is_the_potential_of_the_command(stance, feedback, gravity):
         measured.theta[:] += scale * away
         for _ in range(3):  # the matrices of the fed-back configuration settle
             controller.tick(0.0, measured, out)
-        error.append(np.abs(gradient(controller.storage, measured) + out).max())
+        error.append(np.abs(gradient(controller, measured) + out).max())
         change.append(np.abs(out - still).max())
+    now = np.zeros_like(out)
+    controller.storage(0.0, measured, now)
+    np.testing.assert_allclose(now, out, atol=1e-6 * np.abs(out).max())
     if stack.asymmetry[0] < 1e-8:
         assert error[1] < 0.02 * change[1]
         assert error[1] < 0.35 * error[0]
@@ -238,8 +264,8 @@ def test_storage_of_motor_angles_is_not_that_of_the_static_joint_state():
     static = build(BAXTER, (), feedback=Feedback.STATIC_JOINT, static_iterations=20)
     static.reset(0.0, measured)
     static.tick(0.0, measured, out)
-    right = np.abs(gradient(static.storage, measured) + out).max()
-    wrong = np.abs(gradient(build(BAXTER, ()).storage, measured) + out).max()
+    right = np.abs(gradient(static, measured) + out).max()
+    wrong = np.abs(gradient(build(BAXTER, ()), measured) + out).max()
     assert right < 0.005 * np.abs(out).max()
     assert wrong > 0.05 * np.abs(out).max()
 
@@ -250,9 +276,9 @@ def test_storage_and_tank_are_told_apart():
     controller.reset(0.0, measured)
     controller.tick(0.0, measured, np.zeros(BAXTER.robot.n))
     assert controller.tank_energy == 3.0
-    assert controller.storage(0.0, measured) == pytest.approx(3.0, abs=1e-12)
+    assert stored(controller, measured) == pytest.approx(3.0, abs=1e-12)
     motor = build(BAXTER, (), tank_energy=3.0)
-    assert motor.storage(0.0, measured) == pytest.approx(0.0, abs=1e-12)
+    assert stored(motor, measured) == pytest.approx(0.0, abs=1e-12)
 
 
 # A driver's loop -------------------------------------------------------------------------------
@@ -281,7 +307,7 @@ def test_reset_makes_runs_repeatable_and_storage_leaves_no_trace(feedback):
             commands.append(np.zeros(ANYMAL.robot.n))
             controller.tick(1e-3 * k, measured, commands[-1])
             if watched:
-                controller.storage(1e-3 * k, measured)
+                stored(controller, measured, 1e-3 * k)
         return np.array(commands)
 
     first = run(watched=False)

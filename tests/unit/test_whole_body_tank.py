@@ -132,7 +132,8 @@ def simulate_one_joint(folder, flow, *, up=0.0, rate=20.0, duration=1.5, spring_
         ]
         controller.tick(i * STEP, measured, out)
         commands[i], x_hat[i] = out[0], -out[0] / K_Q
-        energy[i], stored[i] = controller.tank_energy, controller.storage(i * STEP, measured)
+        energy[i] = controller.tank_energy
+        stored[i] = controller.storage(i * STEP, measured, np.zeros(len(measured.theta)))
         acting = commands[max(i - (whole - old), 0)]
         state[i + 1] = (motion @ np.append(state[i], acting))[:4]
     np.testing.assert_allclose(stored, 0.5 * K_Q * x_hat**2 + energy, atol=1e-12)

@@ -12,7 +12,8 @@ from sealag.design import System, load, resolve_project, scenario_duration, simu
 from sealag.errors import InputError
 from sealag.paper import WalkCase, measure_walk
 from sealag.report import write_run
-from sealag.simulation import Run
+from sealag.simulation import Passivity, Run
+from sealag.typing import Array
 
 
 def simulate_project(
@@ -74,7 +75,7 @@ def summary(run: Run, path: Path) -> dict[str, Any]:
         path: its recording.
     """
     books = run.audit
-    joint, central = books.joint_side, books.controller_side
+    joint, central, delay = books.joint_side, books.controller_side, books.delay_side
     return {
         "outcome": run.outcome.value,
         "message": run.message,
@@ -92,8 +93,18 @@ def summary(run: Run, path: Path) -> dict[str, Any]:
         "controller_side_slack_j": float(central.slack.min()) if central else None,
         "first_violation_s": central.first_violation if central else None,
         "violating_joint": central.joint if central else None,
+        "delay_side_passive": delay.passive if delay else None,
+        "delay_side_slack_j": float(delay.slack.min()) if delay else None,
+        "delay_injection_j": _largest(books.delay_injection),
+        "law_injection_j": _largest(books.law_injection),
+        "delay_storage_j": _largest(books.delay_storage),
+        "tank_j": float(books.tank[-1]) if books.tank is not None else None,
         "touchdowns": sum(event.kind.value == "touchdown" for event in run.events),
     }
+
+
+def _largest(values: Array | None) -> float | None:
+    return None if values is None else float(values.max())
 
 
 def gait_summary(system: System, run: Run) -> dict[str, Any]:
@@ -131,16 +142,16 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
         f"{'first law':26} open by {answer['energy_residual_j']:.2e} J of "
         f"{answer['energy_throughput_j']:.4g} J moved"
     )
-    print(f"{'joint side':26} {'passive' if answer['joint_side_passive'] else 'not passive'}")
-    if answer["controller_side_passive"] is not None:
-        word = "passive" if answer["controller_side_passive"] else "not passive"
-        where = ""
-        if answer["first_violation_s"] is not None:
-            where = (
-                f" by {-answer['controller_side_slack_j']:.1e} J, first at "
-                f"{answer['first_violation_s']:.3f} s, {answer['violating_joint']}"
-            )
-        print(f"{'controller side':26} {word}{where}")
+    if books.delay_injection is not None and books.law_injection is not None:
+        print(f"{'injected by the delay':26} {answer['delay_injection_j']:.4g} J at most")
+        print(f"{'injected by moving law':26} {answer['law_injection_j']:.4g} J at most")
+    if books.delay_storage is not None:
+        print(f"{'stored in the delay, V_4':26} {answer['delay_storage_j']:.4g} J at most")
+    if books.tank is not None:
+        print(f"{'energy tank':26} {books.tank[0]:.4f} J at first, {books.tank[-1]:.4f} J at last")
+    _show_side("joint side", books.joint_side)
+    _show_side("controller side", books.controller_side)
+    _show_side("delay and damping", books.delay_side)
     if "steps" in answer:
         speeds = ", ".join(f"{v:.2f}" for v in answer["apex_speed_m_s"])
         widths = ", ".join(f"{w:.2f}" for w in answer["step_width_m"])
@@ -148,3 +159,15 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
         print(f"{'apex speeds':26} {speeds} m/s")
         print(f"{'step widths':26} {widths} m")
     print(f"{'recording':26} {answer['recording']}")
+
+
+def _show_side(name: str, side: Passivity | None) -> None:
+    """What the passivity observer says about one side, if it can say anything."""
+    if side is None:
+        return
+    where = ""
+    if side.first_violation is not None:
+        where = (
+            f" by {-side.slack.min():.1e} J, first at {side.first_violation:.3f} s, {side.joint}"
+        )
+    print(f"{name:26} {'passive' if side.passive else 'not passive'}{where}")

@@ -9,9 +9,10 @@ from sealag.design._criteria import (
 )
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
-from sealag.design._project import System, load, resolve_project
+from sealag.design._project import load, resolve_project
 from sealag.design._simulate import scenario_duration, simulate, walk_scene
 from sealag.design._starter import starter_project
+from sealag.design._system import System, Tank
 from sealag.design._walking import Walking
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Bounds",
     "LocalMargins",
     "System",
+    "Tank",
     "Walking",
     "certified_bounds",
     "certify",

@@ -10,6 +10,7 @@ from sealag import __version__
 from sealag.design._criteria import Bounds, certified_bounds, published_bounds
 from sealag.design._evidence import (
     Common,
+    Local,
     Moving,
     common_multiplier,
     frozen_loop,
@@ -17,15 +18,15 @@ from sealag.design._evidence import (
     moving_multiplier,
     worst_motion,
 )
-from sealag.design._project import System
+from sealag.design._system import System
 from sealag.errors import InputError
 from sealag.passivity import Certificate, Criterion, Status, Worst
 from sealag.robot import Motion
 from sealag.whole_body import (
     Feedback,
     GravityCompensation,
+    TaskError,
     WholeBodyStack,
-    evaluate,
     relative_asymmetry,
 )
 
@@ -65,14 +66,7 @@ def certify(
         raise InputError(f"proofs is {proofs}; the worst instant at least needs its numbers.")
     motion = system.still() if motion is None else motion
     kind = system.criterion if criterion is None else Criterion(criterion)
-    stack = evaluate(
-        system.robot,
-        system.hierarchy,
-        system.actuators,
-        motion=motion,
-        feedback=system.feedback,
-        gravity=system.gravity,
-    )
+    stack = system.evaluate(motion)
     published = published_bounds(stack, system)
     bounds = published if kind is Criterion.PUBLISHED else certified_bounds(stack, system)
     shared = kind is Criterion.CERTIFIED and len(motion) > 1 and not bounds.reasons
@@ -86,15 +80,16 @@ def certify(
         count=proofs,
         binding=common.binding if common else (),
     )
+    local = frozen_loop(system, motion, stack, instant=int(np.argmin(bounds.delay)))
     return Certificate(
-        **_answer(system, stack, bounds, kind=kind),
-        **_at_worst(system, motion, stack, bounds),
+        **_answer(system, stack, bounds, kind=kind, local=local),
+        **_at_worst(system, motion, bounds, local),
         **_shared(common, moving),
         **_design(system),
         instants=len(motion),
         levels=[int(row) for row in stack.levels],
         published_max_delay_s=float(published.delay.min()),
-        assumptions=_assumptions(system, kind, motion),
+        assumptions=_assumptions(system, kind, motion, local),
         time_s=motion.time.tolist(),
         bounds_s=bounds.delay.tolist(),
         proofs=held,
@@ -121,7 +116,7 @@ def _design(system: System) -> dict[str, Any]:
 
 
 def _answer(
-    system: System, stack: WholeBodyStack, bounds: Bounds, *, kind: Criterion
+    system: System, stack: WholeBodyStack, bounds: Bounds, *, kind: Criterion, local: Local
 ) -> dict[str, Any]:
     """Status with its reasons, and what decides it."""
     worst = int(np.argmin(bounds.delay))
@@ -131,6 +126,12 @@ def _answer(
         reasons.append(
             f"the design's delay of {delay_s * 1e3:.3f} ms exceeds the bound of "
             f"{max_delay_s * 1e3:.3f} ms"
+        )
+    certified, margin = kind is Criterion.CERTIFIED, local.margin_s
+    if certified and not reasons and local.stable and margin is not None and margin < max_delay_s:
+        reasons.append(
+            f"the law that is run loses its stability at {margin * 1e3:.3f} ms, before its bound: "
+            "it also answers to passive motions of the base, which no bound covers"
         )
     crooked = relative_asymmetry(bounds.F) if kind is Criterion.PUBLISHED else stack.asymmetry
     return {
@@ -145,14 +146,11 @@ def _answer(
     }
 
 
-def _at_worst(
-    system: System, motion: Motion, stack: WholeBodyStack, bounds: Bounds
-) -> dict[str, Any]:
+def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> dict[str, Any]:
     """The worst instant: which, its limiting direction, and its frozen loop."""
     worst = int(np.argmin(bounds.delay))
     y = worst_motion(system, bounds, worst)
     power = system.actuators.motor_damping * np.abs(y) ** 2
-    local = frozen_loop(system, motion, stack, instant=worst)
     margin, bound = local.margin_s, float(bounds.delay[worst])
     known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
     return {
@@ -184,18 +182,32 @@ def _shared(common: Common | None, moving: Moving | None) -> dict[str, Any]:
     }
 
 
-def _assumptions(system: System, criterion: Criterion, motion: Motion) -> tuple[str, ...]:
+def _assumptions(
+    system: System, criterion: Criterion, motion: Motion, local: Local
+) -> tuple[str, ...]:
     said = [
         "coefficients are frozen at each instant (quasi-static: the multiplier may differ from "
         "instant to instant; `common_multiplier_delay_s` is the bound with a single one)",
         "the embedded motor damping D_θ acts without delay",
-        f"d_1 is at most {system.delays.d_1 * 1e3:.3f} ms; it may vary below that",
+        f"d_1 is at most {system.delays.d_1 * 1e3:.3f} ms; it may vary below that; where no "
+        "embedded period is given, packets are sent and taken at once",
         "contacts neither slip nor lift off",
     ]
     if system.gravity is GravityCompensation.PLANNED:
         said.append("gravity compensation comes from the plan and has no feedback gradient")
     if system.feedback is Feedback.STATIC_JOINT_TANK:
-        said.append("the energy tank pays for all that u does and never runs empty")
+        said.append("the energy tank pays for all that u does; u = 0 while it is empty")
+    if len(system.hierarchy.levels(system.robot)) > 2:
+        said.append(
+            "a lower task's error is what the tasks above leave of it"
+            if system.task_error is TaskError.CONSISTENT
+            else "lower tasks feed back their whole errors, as printed"
+        )
+    if local.coupled:
+        said.append(
+            "motions of the base that the motors do not determine stand still: what they move of "
+            "x is an input, not part of the delayed loop; the local margin includes them"
+        )
     if criterion is Criterion.PUBLISHED:
         said.append(
             "the criterion is (29)/(31) as printed: it takes Λ K_x for symmetric, x(θ) for what is "

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.design._project import System
+from sealag.design._system import System
 from sealag.passivity import max_delay, max_delay_from_stiffness, max_delay_multitask
 from sealag.typing import Array
-from sealag.whole_body import Feedback, StiffnessForm, WholeBodyStack
+from sealag.whole_body import Feedback, StiffnessForm, TankFlow, TaskError, WholeBodyStack
 
 ASYMMETRY_TOLERANCE = 1e-7
 """Relative asymmetry up to which a stiffness counts as symmetric: rounding, and the error of the
@@ -59,6 +59,12 @@ def certified_bounds(stack: WholeBodyStack, system: System) -> Bounds:
             "bound covers it; rely on the local margin"
         )
         good[:] = False
+    if system.feedback is Feedback.STATIC_JOINT_TANK and system.tank.flow is TankFlow.PUBLISHED:
+        reasons.append(
+            "the published flow of the energy tank does not pay for u's work on the spring "
+            "potential; the corrected flow does"
+        )
+        good[:] = False
     if system.feedback is Feedback.STATIC_JOINT and (stack.contraction >= 1.0).any():
         bad = stack.contraction >= 1.0
         reasons.append(
@@ -68,11 +74,7 @@ def certified_bounds(stack: WholeBodyStack, system: System) -> Bounds:
         good &= ~bad
     crooked = good & ~(stack.asymmetry <= ASYMMETRY_TOLERANCE)
     if crooked.any():
-        source = (
-            "fed-back gravity compensation where contacts or free motions make joints dependent"
-            if system.hierarchy.form is not StiffnessForm.PUBLISHED
-            else "the stiffness Λ K_x"
-        )
+        source = _crooked_source(system)
         reasons.append(
             f"the fed-back stiffness is not symmetric at {crooked.sum()} of {len(good)} instants "
             f"(asymmetry up to {stack.asymmetry[crooked].max():.2e}, from {source}), so that no "
@@ -94,6 +96,15 @@ def certified_bounds(stack: WholeBodyStack, system: System) -> Bounds:
         angle=bound.angle,
         reasons=tuple(reasons),
     )
+
+
+def _crooked_source(system: System) -> str:
+    """What makes a stiffness asymmetric."""
+    if system.hierarchy.form is StiffnessForm.PUBLISHED:
+        return "the stiffness Λ K_x"
+    if system.task_error is TaskError.PLAIN and len(system.hierarchy.levels(system.robot)) > 2:
+        return "lower tasks that feed back what higher ones move"
+    return "fed-back gravity compensation where contacts or free motions make joints dependent"
 
 
 def _semidefinite(F: Array) -> Array:

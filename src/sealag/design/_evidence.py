@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.design._criteria import ASYMMETRY_TOLERANCE, PROOF_SHARE, Bounds
-from sealag.design._project import System
+from sealag.design._system import System
 from sealag.errors import SolverError
 from sealag.margin import delay_margin
 from sealag.passivity import (
@@ -21,7 +21,10 @@ from sealag.passivity import (
 )
 from sealag.robot import Motion
 from sealag.typing import Array
-from sealag.whole_body import Feedback, Linearisation, StiffnessForm, WholeBodyStack, linearise
+from sealag.whole_body import Feedback, Linearisation, StiffnessForm, WholeBodyStack
+
+COUPLING_TOLERANCE = 1e-6
+"""Share of F from which an answer to passive motions of the base counts."""
 
 POLYTOPE_WINDOW = 20
 """Intervals between instants in one window of the time-varying bound."""
@@ -65,7 +68,9 @@ class Local:
         margin_s: exact delay margin, s; None if it could not be decided.
         first_crossing_s: first delay at which roots cross, s; None likewise.
         unstable: roots with positive real part without delay.
-        stable: whether the potential has a strict minimum; None where that has no meaning.
+        stable: whether the potential has a strict minimum; without a potential, because the law
+            answers to passive motions, whether no root is unstable; None where unknown.
+        coupling: ‖−∂τ_osc/∂z‖ at fixed θ over ‖F‖, z the motions that contacts leave free.
         loop: the loop; None where the fed-back signal has none.
     """
 
@@ -73,7 +78,13 @@ class Local:
     first_crossing_s: float | None
     unstable: int
     stable: bool | None
+    coupling: float
     loop: LocalLoop | None
+
+    @property
+    def coupled(self) -> bool:
+        """Whether the law answers to passive motions of the base."""
+        return self.coupling > COUPLING_TOLERANCE
 
 
 def common_multiplier(system: System, bounds: Bounds) -> Common:
@@ -154,38 +165,31 @@ def frozen_loop(system: System, motion: Motion, stack: WholeBodyStack, *, instan
         stack: the controller's matrices.
         instant: which one.
     """
-    F = stack.F_theta[instant]
-    if not np.isfinite(F).all():
-        return Local(margin_s=None, first_crossing_s=None, unstable=0, stable=None, loop=None)
-    frozen = linearise(
-        system.robot,
-        system.actuators,
-        motion.q[instant],
-        contacts=motion.contact_sets[motion.contact_index[instant]],
-        F=F,
-        feedback=system.feedback,
-    )
-    symmetric = stack.asymmetry[instant] <= ASYMMETRY_TOLERANCE
-    potential = symmetric and system.feedback is not Feedback.JOINT
-    stable = frozen.stable if potential else None
+    if not np.isfinite(stack.F_theta[instant]).all():
+        return Local(
+            margin_s=None, first_crossing_s=None, unstable=0, stable=None, coupling=0.0, loop=None
+        )
+    frozen = system.frozen(motion, stack, instant)
     try:
         margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries)
+        margin_s, crossing_s = float(margin.delay), float(margin.first_crossing)
+        unstable, frequency = margin.unstable_roots, margin.frequency
     except SolverError:
         values = np.linalg.eigvals(frozen.A_0 + frozen.A_1)
         unstable = int((values.real > 1e-9 * np.abs(values).max()).sum())
-        return Local(
-            margin_s=0.0 if unstable else None,
-            first_crossing_s=None,
-            unstable=unstable,
-            stable=stable,
-            loop=_loop(system, frozen, math.nan),
-        )
+        margin_s, crossing_s, frequency = 0.0 if unstable else None, None, math.nan
+    symmetric = stack.asymmetry[instant] <= ASYMMETRY_TOLERANCE
+    stable = frozen.stable if symmetric and system.feedback is not Feedback.JOINT else None
+    coupling = 0.0 if system.feedback is Feedback.JOINT else frozen.passive_coupling
+    if coupling > COUPLING_TOLERANCE:
+        stable = unstable == 0
     return Local(
-        margin_s=float(margin.delay),
-        first_crossing_s=float(margin.first_crossing),
-        unstable=margin.unstable_roots,
+        margin_s=margin_s,
+        first_crossing_s=crossing_s,
+        unstable=unstable,
         stable=stable,
-        loop=_loop(system, frozen, margin.frequency),
+        coupling=coupling,
+        loop=_loop(system, frozen, frequency),
     )
 
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from sealag.design._project import System
+from sealag.design._system import System
 from sealag.errors import ContractionError
 from sealag.margin import DelayMargin, Interval, delay_margin
 from sealag.robot import Motion
-from sealag.whole_body import Linearisation, evaluate, linearise
+from sealag.whole_body import Linearisation
 
 LARGEST_SAMPLE = 200
 
@@ -86,14 +86,7 @@ def local_margins(
         contact_sets=motion.contact_sets,
         contact_index=motion.contact_index[sample],
     )
-    stack = evaluate(
-        system.robot,
-        system.hierarchy,
-        system.actuators,
-        motion=part,
-        feedback=system.feedback,
-        gravity=system.gravity,
-    )
+    stack = system.evaluate(part)
     if not np.isfinite(stack.F_theta).all():
         raise ContractionError(
             f"q̄(θ) is fed back but is no contraction (factor {stack.contraction.max():.2f}): the "
@@ -101,14 +94,7 @@ def local_margins(
         )
     found: list[tuple[DelayMargin, Linearisation]] = []
     for k in range(len(part)):
-        frozen = linearise(
-            system.robot,
-            system.actuators,
-            part.q[k],
-            contacts=part.contact_sets[part.contact_index[k]],
-            F=stack.F_theta[k],
-            feedback=system.feedback,
-        )
+        frozen = system.frozen(part, stack, k)
         found.append((delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries), frozen))
     at = min(range(len(found)), key=lambda k: (found[k][0].delay, found[k][0].first_crossing))
     margin, frozen = found[at]

@@ -2,7 +2,6 @@
 
 import hashlib
 import tomllib
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +19,20 @@ from sealag.delay import (
     Table,
     measured,
 )
-from sealag.design._schema import Project, SimulationSection
-from sealag.design._walking import Walking, walking_of
+from sealag.design._schema import Project
+from sealag.design._system import System, Tank
+from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
 from sealag.passivity import Criterion
-from sealag.robot import Contact, ContactKind, Motion, Robot, load_robot, resolve_urdf
-from sealag.typing import Array
+from sealag.robot import Contact, ContactKind, Robot, load_robot, resolve_urdf
 from sealag.whole_body import (
     Feedback,
     GravityCompensation,
     Hierarchy,
     StiffnessForm,
+    TankFlow,
     Task,
+    TaskError,
     TaskInertia,
     TaskKind,
 )
@@ -39,55 +40,6 @@ from sealag.whole_body import (
 LARGEST_PROJECT_BYTES = 1_000_000
 _AXES = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
 _REQUIRED = ("spring_stiffness", "rotor_inertia", "motor_damping", "inertia_shaping")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class System:
-    """A robot with its actuators, controller and delays: what a project file describes.
-
-    Attributes:
-        name: the project file's name.
-        robot: the robot.
-        actuators: its series elastic actuators.
-        hierarchy: the controller's tasks.
-        contacts: which frames are held when a motion does not say it.
-        posture: (nq,) configuration that is certified without a motion.
-        feedback: the signal that is fed back.
-        gravity: where gravity compensation takes its configuration from.
-        criterion: the criterion that certifies by default.
-        delays: both loops' delays.
-        motion_file: the project's own motion, if it names one.
-        sha256: of the project file; empty if the system was built in Python.
-        simulation: the project's [simulation] section.
-        walking: the walk that the project describes; None if it has no [walking] section.
-        text: the project file's own text, which recordings carry along.
-    """
-
-    name: str
-    robot: Robot
-    actuators: Actuators
-    hierarchy: Hierarchy
-    contacts: tuple[Contact, ...]
-    posture: Array
-    feedback: Feedback
-    gravity: GravityCompensation
-    criterion: Criterion
-    delays: Delays
-    motion_file: Path | None
-    sha256: str
-    simulation: SimulationSection
-    walking: Walking | None
-    text: str
-
-    def still(self) -> Motion:
-        """Return the posture as a motion of one instant."""
-        return Motion(
-            time=np.zeros(1),
-            q=self.posture[None],
-            v=np.zeros((1, self.robot.nv)),
-            contact_sets=(self.contacts,),
-            contact_index=np.zeros(1, dtype=np.int64),
-        )
 
 
 def resolve_project(text: str | Path) -> Path:
@@ -228,6 +180,12 @@ def _system(project: Any, path: Path, text: str) -> System:
         posture=posture,
         feedback=Feedback(project.controller.feedback),
         gravity=GravityCompensation(project.controller.gravity),
+        task_error=TaskError(project.controller.task_error),
+        tank=Tank(
+            flow=TankFlow(project.controller.tank_flow),
+            energy=project.controller.tank_energy_j,
+            rate=project.controller.tank_rate,
+        ),
         criterion=Criterion(project.controller.criterion),
         delays=_delays(project.delays, folder, path),
         motion_file=folder / project.motion.file if project.motion else None,

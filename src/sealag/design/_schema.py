@@ -72,7 +72,11 @@ class ControllerSection(Section):
     gravity: Literal["feedback", "planned", "none"]
     stiffness_form: Literal["symmetric", "published", "force"] = "symmetric"
     task_inertia: Literal["lambda_ts", "lambda_star"] = "lambda_ts"
+    task_error: Literal["consistent", "plain"] = "consistent"
     criterion: Literal["certified", "published"] = "certified"
+    tank_flow: Literal["corrected", "published"] = "corrected"
+    tank_energy_j: NotNegative = 1.0
+    tank_rate: NotNegative = 5.0
 
 
 class TaskSection(Section):

@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from sealag.design._project import System
+from sealag.design._criteria import certified_bounds
+from sealag.design._system import System
 from sealag.design._walking import Walking
 from sealag.errors import InputError, either
 from sealag.locomotion import begin_walk
+from sealag.passivity import DelayStorage, joint_multiplier
 from sealag.robot import Contact, ContactKind
 from sealag.simulation import (
     Clock,
@@ -91,10 +94,11 @@ def simulate(
             torque_limit=system.actuators.torque_limit,
         )
     controller = _controller(system, kind, q)
+    held = q
     if kind == "drop" and system.robot.floating_base:
         q = q.copy()
         q[2] += setting.drop_height
-    return closed_loop(
+    run = closed_loop(
         system.robot,
         system.actuators,
         controller,
@@ -102,6 +106,22 @@ def simulate(
         scene=scene,
         **common,
     )
+    return _with_delay_storage(run, system, held)
+
+
+def _with_delay_storage(run: Run, system: System, q: Array) -> Run:
+    """Add V_4 with the multiplier that certifies the held posture, if one does."""
+    if run.audit.controller_side is None or len(run.time) < 3:
+        return run
+    motion = replace(system.still(), q=q[None])
+    bounds = certified_bounds(system.evaluate(motion), system)
+    delay, step = float(bounds.delay[0]), float(run.time[1] - run.time[0])
+    if not step <= delay < math.inf:
+        return run
+    Y = joint_multiplier(bounds.F[0], system.actuators.motor_damping, delay)
+    window = DelayStorage(Y=Y, delay=delay, step=step)
+    stored = np.array([window.update(rate) for rate in run.theta_dot])
+    return replace(run, audit=replace(run.audit, delay_storage=stored))
 
 
 def scenario_duration(system: System, scenario: str | None = None) -> float:
@@ -191,7 +211,13 @@ def _controller(system: System, kind: str, q: Array) -> TickController:
         contacts=system.contacts,
         posture=q,
         options=ControllerOptions(
-            feedback=system.feedback, gravity=system.gravity, delay_bound=system.delays.d_1
+            feedback=system.feedback,
+            gravity=system.gravity,
+            task_error=system.task_error,
+            tank_flow=system.tank.flow,
+            tank_energy=system.tank.energy,
+            tank_rate=system.tank.rate,
+            delay_bound=system.delays.d_1,
         ),
         reference=wave if kind == "track" else None,
     )

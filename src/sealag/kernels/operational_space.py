@@ -305,12 +305,12 @@ def operational_spaces(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space
         M: (N, nv, nv); g: (N, nv); J_s: (N, c, nv); J_t: (N, m, nv).
         K_x: as in `operational_space`, with levels, form, star, tolerance and space.
         out: J_star (N, m, n), Lambda (N, m, m), stiffness (N, m, m), joint_from_base
-            (N, nv, n), gravity (N, n), all written.
+            (N, nv, n), gravity (N, n), lift (N, m, nv), all written.
 
     Returns:
         The first instant at which M is not positive definite, or -1.
     """
-    J_star, Lambda, stiffness, joint_from_base, gravity = out
+    J_star, Lambda, stiffness, joint_from_base, gravity, lift = out
     for k in range(M.shape[0]):
         if not operational_space(
             M[k], g[k], J_s[k], J_t[k], K_x, levels, form, star, tolerance, space
@@ -321,6 +321,7 @@ def operational_spaces(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space
         stiffness[k] = space.stiffness
         joint_from_base[k] = space.joint_from_base
         gravity[k] = space.gravity
+        lift[k] = space.lift
     return -1
 
 
@@ -371,6 +372,7 @@ def warm() -> None:
             np.zeros((1, 1, 1)),
             np.zeros((1, 2, 1)),
             np.zeros((1, 1)),
+            np.zeros((1, 1, 2)),
         ),
     )
     task_torque(space.J_star, space.stiffness, np.zeros(1), space.gravity, np.zeros(1))

@@ -12,7 +12,7 @@ from sealag.paper._walk_table import WalkRow, walk_success
 from sealag.robot import Motion
 from sealag.simulation import Push
 from sealag.typing import Array
-from sealag.whole_body import Feedback, evaluate
+from sealag.whole_body import Feedback
 
 PUSH = 0.1  # s
 PUSHED = 1.3  # s, in the fourth step
@@ -152,14 +152,7 @@ def _bounds(system: System, motion: Motion, stiffness: float) -> tuple[float, fl
     certified = []
     for feedback in (Feedback.MOTOR, Feedback.STATIC_JOINT):
         variant = replace(design, feedback=feedback)
-        stack = evaluate(
-            variant.robot,
-            variant.hierarchy,
-            variant.actuators,
-            motion=motion,
-            feedback=feedback,
-            gravity=variant.gravity,
-        )
+        stack = variant.evaluate(motion)
         certified.append(float(certified_bounds(stack, variant).delay.min()))
     thin = max(1, len(motion) // 100)
     part = Motion(

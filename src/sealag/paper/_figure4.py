@@ -168,14 +168,7 @@ def _certified(
     """The certified criterion for one way to run the gains, all six joints."""
     hierarchy = replace(system.hierarchy, form=form)
     design = replace(system, hierarchy=hierarchy, feedback=feedback, gravity=gravity)
-    stack = evaluate(
-        system.robot,
-        hierarchy,
-        system.actuators,
-        motion=motion,
-        feedback=feedback,
-        gravity=gravity,
-    )
+    stack = design.evaluate(motion)
     bounds = certified_bounds(stack, design)
     return CertifiedVariant(
         feedback=feedback,

@@ -7,12 +7,13 @@ import numpy as np
 from sealag.report._mcap import McapRecorder
 from sealag.robot import Robot
 from sealag.simulation import Run
+from sealag.typing import Array
 
 _BLOCK = 500
 
 
 def write_run(run: Run, robot: Robot, path: Path, *, project: str, version: str) -> None:
-    """Write a run: joint states, torques, frame poses, contact, energy, and what it was run from.
+    """Write a run: joint states, torques, frame poses, contact, energy, works and origin.
 
     Args:
         run: the run.
@@ -37,7 +38,13 @@ def write_run(run: Run, robot: Robot, path: Path, *, project: str, version: str)
         "project.toml": project.encode(),
         robot.urdf_path.name: robot.urdf_path.read_bytes(),
     }
-    books = run.audit
+    tables = {"/delay": _ages(run), "/energy": _energies(run), "/work": _works(run)}
+    tables["/power/port"] = {
+        f"{joint}_w": run.tau_sea[:, k] * run.v[:, robot.nv_base + k]
+        for k, joint in enumerate(run.joints)
+    }
+    if run.feet:
+        tables["/contact"] = _contacts(run)
     with McapRecorder(
         path=path, joints=run.joints, metadata=metadata, attachments=attachments
     ) as recorder:
@@ -57,18 +64,64 @@ def write_run(run: Run, robot: Robot, path: Path, *, project: str, version: str)
             ):
                 names = [f"{joint}_{unit}" for joint in run.joints]
                 recorder.write_signal(topic, names, time, values=values[rows])
-            ages = np.column_stack([run.measurement_age[rows], run.command_age[rows]])
-            recorder.write_signal("/delay", ["measurement_s", "command_s"], time, values=ages)
-            energy = np.column_stack(
-                [*(e[rows] for e in books.stores.values()), books.residual[rows]]
-            )
-            names = [*(f"{name}_j" for name in books.stores), "residual_j"]
-            recorder.write_signal("/energy", names, time, values=energy)
+            for topic, table in tables.items():
+                values = np.column_stack([column[rows] for column in table.values()])
+                recorder.write_signal(topic, list(table), time, values=values)
             poses = np.array([_poses(robot, frames, q) for q in run.q[rows]])
             recorder.write_transforms(frames, time, poses)
 
 
-def _poses(robot: Robot, frames: list[str], q: np.ndarray) -> np.ndarray:
+def _ages(run: Run) -> dict[str, Array]:
+    return {"measurement_s": run.measurement_age, "command_s": run.command_age}
+
+
+def _energies(run: Run) -> dict[str, Array]:
+    """What is stored, and what the books of the first law leave open."""
+    books = run.audit
+    named = {
+        **books.stores,
+        "controller": books.controller_storage,
+        "tank": books.tank,
+        "delay_line": books.delay_storage,
+        "residual": books.residual,
+    }
+    return {f"{name}_j": values for name, values in named.items() if values is not None}
+
+
+def _works(run: Run) -> dict[str, Array]:
+    """Works since the start by mechanism, and the slack of each passivity observer."""
+    books = run.audit
+    named = {name: works.sum(axis=1) for name, works in books.joint_flows.items()}
+    named |= books.scalar_flows | {"inertia_shaping": books.inertia_shaping}
+    for name, works in (
+        ("delay_injection", books.delay_injection),
+        ("law_injection", books.law_injection),
+    ):
+        if works is not None:
+            named[name] = works
+    for name, side in (
+        ("joint_side_slack", books.joint_side),
+        ("controller_side_slack", books.controller_side),
+        ("delay_side_slack", books.delay_side),
+    ):
+        if side is not None:
+            named[name] = side.slack
+    return {f"{name}_j": works for name, works in named.items()}
+
+
+def _contacts(run: Run) -> dict[str, Array]:
+    """Mode (0 open, 1 sticking, 2 slipping) and force of each contact point."""
+    columns: dict[str, Array] = {}
+    for point, foot in enumerate(run.feet):
+        number = run.feet[:point].count(foot)
+        name = f"{foot}_{number}" if run.feet.count(foot) > 1 else foot
+        columns[f"{name}_mode"] = run.contact_mode[:, point].astype(float)
+        for axis, way in enumerate(("tangent_1", "tangent_2", "normal")):
+            columns[f"{name}_{way}_n"] = run.contact_force[:, point, axis]
+    return columns
+
+
+def _poses(robot: Robot, frames: list[str], q: Array) -> Array:
     """Position and quaternion of each frame, one behind the other."""
     row = []
     at = robot.workspace_at(q)
@@ -78,7 +131,7 @@ def _poses(robot: Robot, frames: list[str], q: np.ndarray) -> np.ndarray:
     return np.array(row)
 
 
-def _quaternion(R: np.ndarray) -> np.ndarray:
+def _quaternion(R: Array) -> Array:
     """x, y, z, w of a rotation matrix."""
     from scipy.spatial.transform import Rotation
 

@@ -10,6 +10,11 @@ rotor inertia B_s as in the storage function S_j = V_1:
 - joint side:      ∫(τ_osc - D_θ θ̇)ᵀθ̇ dt + disturbances - (S_j - S_j(0)) >= 0,
 - controller side: -∫(τ_osc - D_θ θ̇)ᵀθ̇ dt - (V_3 - V_3(0)) >= 0, the slack being V_4 (what the
   delay line stores) and what was dissipated.
+
+What the command gives besides V_3 has two sources. The delay's, ∫(τ_osc - τ_now)ᵀθ̇ dt with τ_now
+the undelayed command, is what a certificate bounds: it stays below ∫D_θ θ̇² dt. The law's own,
+∫τ_nowᵀθ̇ dt + V_3 - V_3(0), is zero where the law has a potential and its coefficients stand still,
+as a certificate assumes; moving J*, Λ and references put it there.
 """
 
 from dataclasses import dataclass
@@ -29,7 +34,8 @@ class Passivity:
         passive: True if the slack never fell below ``-tolerance``.
         first_violation: First logged instant at which it did, s; None if never.
         joint: Joint that had delivered most energy at that instant; None if never.
-        tolerance: What rounding and integration may spend: twice the largest residual, J.
+        tolerance: What rounding and integration may spend, J: twice the largest residual, and the
+            error of what is integrated from the log.
     """
 
     slack: Array
@@ -55,13 +61,20 @@ class Audit:
             motor_work less what tau_osc and the damping account for through B / B_s.
         residual: Energy present less energy expected (N,): the first law's error.
         throughput: Sum of the absolute changes of the stores (N,).
-        controller_storage: V_3 that the controller states (N,); None if it states none.
-        delay_injection: Work of the command less what V_3 gave (N,): the energy that delay,
-            sampling and losses have put into the robot; passive while the damping takes as much.
-            None if the controller states no storage.
+        controller_storage: V_3 and the tank's energy, as the controller states them (N,); None if
+            it states none.
+        tank: The energy tank's part of it (N,); None without a tank.
+        delay_storage: V_4 (N,) with the multiplier of the design's certificate; None if nothing
+            certifies the run's design.
+        delay_injection: ∫(τ_osc − τ_now)ᵀθ̇ (N,): the energy that delay, sampling and losses have
+            put into the robot; None if the controller does not state its undelayed command.
+        law_injection: ∫τ_nowᵀθ̇ + V_3 − V_3(0) (N,): what the undelayed law has given besides its
+            potential; None like ``delay_injection``.
         joint_side: Passivity of springs, motors, links and contacts (S_j).
         controller_side: Passivity of controller and delay (S_c); None if the controller states
             no storage function.
+        delay_side: Passivity of delay and damping alone: what a certificate promises, for
+            coefficients that move too; None like ``delay_injection``.
     """
 
     time: Array
@@ -72,9 +85,13 @@ class Audit:
     residual: Array
     throughput: Array
     controller_storage: Array | None
+    tank: Array | None
+    delay_storage: Array | None
     delay_injection: Array | None
+    law_injection: Array | None
     joint_side: Passivity
     controller_side: Passivity | None
+    delay_side: Passivity | None
 
     @property
     def closure(self) -> float:
@@ -82,6 +99,21 @@ class Audit:
         largest = float(np.abs(self.residual).max(initial=0.0))
         moved = float(self.throughput[-1]) if self.throughput.size else 0.0
         return largest / moved if moved > 0 else largest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stated:
+    """What a controller states about itself at the logged instants.
+
+    Attributes:
+        storage: V_3 and the tank's energy (N,), J.
+        tank: The tank's energy (N,), J; None without a tank.
+        command: The undelayed command τ_now (N, n), Nm.
+    """
+
+    storage: Array
+    tank: Array | None
+    command: Array
 
 
 def audit(
@@ -92,9 +124,10 @@ def audit(
     joint: Array,
     scalar: Array,
     throughput: Array,
-    storage: Array | None,
-    shaped: Array,
+    theta_dot: Array,
+    shaped_inertia: Array,
     ratio: Array,
+    stated: Stated | None,
 ) -> Audit:
     """Assemble the audit of a run from its logged books.
 
@@ -105,22 +138,29 @@ def audit(
         joint: Works per joint (N, 8, n), J.
         scalar: Other works (N, 5), J.
         throughput: Energy moved (N,), J.
-        storage: Controller's V_3 (N,), J; None if it states none.
-        shaped: Energy of the shaped rotors ½ θ̇ᵀB_s θ̇ (N,), J.
+        theta_dot: Motor speeds (N, n), rad/s.
+        shaped_inertia: B_s (n,), kg m².
         ratio: B / B_s (n,).
+        stated: What the controller states about itself; None if nothing.
     """
     flows = {name: joint[:, k] for k, name in enumerate(JOINT_FLOWS)}
     drive = flows["command"] - flows["damping"]
     error = residual(stores, joint, scalar)
     spent = float(np.abs(error).max(initial=0.0))
     tolerance = 2.0 * spent + 1e-9 * float(throughput[-1]) + 1e-12 if time.size else 0.0
-    s_j = stores[:, :3].sum(axis=1) + shaped
+    s_j = stores[:, :3].sum(axis=1) + 0.5 * theta_dot**2 @ shaped_inertia
     joint_slack = drive.sum(axis=1) + scalar[:, 3] - (s_j - s_j[:1])
-    control = injection = None
-    if storage is not None:
-        injection = flows["command"].sum(axis=1) + storage - storage[:1]
-        slack = flows["damping"].sum(axis=1) - injection
-        control = _observe(time, slack, drive, joints, tolerance)
+    control = delay = injection = own = None
+    if stated is not None:
+        present, rough = _work(time, stated.command * theta_dot)
+        late = flows["command"] - present
+        injection = late.sum(axis=1)
+        own = present.sum(axis=1) + stated.storage - stated.storage[:1]
+        damped = flows["damping"].sum(axis=1)
+        control = _observe(time, damped - injection - own, drive, joints, tolerance)
+        delay = _observe(
+            time, damped - injection, late - flows["damping"], joints, tolerance + rough
+        )
     return Audit(
         time=time,
         stores={name: stores[:, k] for k, name in enumerate(STORES)},
@@ -129,11 +169,30 @@ def audit(
         inertia_shaping=(flows["motor_work"] - ratio * drive).sum(axis=1),
         residual=error,
         throughput=throughput,
-        controller_storage=storage,
+        controller_storage=None if stated is None else stated.storage,
+        tank=None if stated is None else stated.tank,
+        delay_storage=None,
         delay_injection=injection,
+        law_injection=own,
         joint_side=_observe(time, joint_slack, -drive, joints, tolerance),
         controller_side=control,
+        delay_side=delay,
     )
+
+
+def _work(time: Array, power: Array) -> tuple[Array, float]:
+    """Integrate logged powers (N, n) by Simpson's rule; a bound of its error from the trapezoid's.
+
+    Returns:
+        Works since the first instant (N, n), and the bound of the error of their sum, J.
+    """
+    from scipy.integrate import cumulative_simpson, cumulative_trapezoid
+
+    if len(time) < 3:
+        return np.zeros_like(power), 0.0
+    fine = cumulative_simpson(power, x=time, axis=0, initial=0.0)
+    coarse = cumulative_trapezoid(power, x=time, axis=0, initial=0.0)
+    return fine, float(np.abs((fine - coarse).sum(axis=1)).max())
 
 
 def _observe(

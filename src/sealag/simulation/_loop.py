@@ -9,7 +9,7 @@ from sealag.actuation import Actuators
 from sealag.delay import DelayLine
 from sealag.errors import InputError, SealagError
 from sealag.robot import Robot
-from sealag.simulation._audit import audit
+from sealag.simulation._audit import Stated, audit
 from sealag.simulation._ledger import JOINT_FLOWS, ledger_sizes
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
@@ -17,7 +17,12 @@ from sealag.simulation._plant import FASTEST, Plant
 from sealag.simulation._run import Log, Run
 from sealag.simulation._scene import Scene
 from sealag.typing import Array
-from sealag.whole_body import Measurement, StoringController, TickController
+from sealag.whole_body import (
+    Measurement,
+    StoringController,
+    TankController,
+    TickController,
+)
 
 _WATCH = 5e-3  # s between two looks for a fall
 _LONGEST = 100.0  # rad: a spring deflection beyond any physical range
@@ -122,6 +127,8 @@ class _Loop:
         self._torque_held = np.zeros(n)
         self._open_lines(network, n)
         self._storing = controller if isinstance(controller, StoringController) else None
+        self._tank = controller if isinstance(controller, TankController) else None
+        self._present = np.zeros(n)
         self._pushes = [(frames.index(push.frame), push) for push in scene.pushes]
         self._fall_height, self._upright = -np.inf, (0.0, 0.0, 1.0)
 
@@ -295,7 +302,7 @@ class _Loop:
     def _allocate(self, rows: int) -> Log:
         n, plant = self.robot.n, self.plant
         widths = {"time": 1, "instant": plant.instant.row.size, "tau_command": n, "tau_osc": n}
-        widths |= {"measurement_age": 1, "command_age": 1, "storage": 1}
+        widths |= {"measurement_age": 1, "command_age": 1, "storage": 1, "tank": 1, "present": n}
         widths |= dict.fromkeys(("closed", "yielding"), plant.contacts.count)
         return Log(rows, widths | {"ledger": plant.ledger.data.size})
 
@@ -303,12 +310,13 @@ class _Loop:
         plant, t, storage = self.plant, self.plant.time, 0.0
         if self._storing is not None:
             self._sense(t)
-            storage = self._storing.storage(t, self.truth)
+            storage = self._storing.storage(t, self.truth, self._present)
         closed, yielding = plant.contacts.state
         log.row(
             t, plant.instant.row, self.command[1:], self.acting[1:],
             float(self.command[0] - self.received.data[0]), t - float(self.acting[0]), storage,
-            closed, yielding, plant.ledger.data,
+            0.0 if self._tank is None else self._tank.tank_energy, self._present, closed,
+            yielding, plant.ledger.data,
         )  # fmt: skip
 
     def _result(self, log: Log, outcome: Outcome, message: str) -> Run:
@@ -341,10 +349,22 @@ class _Loop:
                 joint=works.reshape(-1, len(JOINT_FLOWS), n),
                 scalar=scalar,
                 throughput=moved[:, 0],
-                storage=log.column("storage") if self._storing is not None else None,
-                shaped=0.5 * state["theta_dot"] ** 2 @ actuators.shaped_inertia,
+                theta_dot=state["theta_dot"],
+                shaped_inertia=actuators.shaped_inertia,
                 ratio=actuators.rotor_inertia / actuators.shaped_inertia,
+                stated=self._stated(log),
             ),
+        )
+
+    def _stated(self, log: Log) -> Stated | None:
+        """What the controller said about itself, if it does."""
+        if self._storing is None:
+            return None
+        tank = log.column("tank")
+        return Stated(
+            storage=log.column("storage"),
+            tank=tank if tank.any() else None,
+            command=log.column("present", self.robot.n),
         )
 
 

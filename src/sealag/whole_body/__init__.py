@@ -3,11 +3,17 @@
 from sealag.whole_body._controller import Controller
 from sealag.whole_body._linearise import Linearisation, linearise
 from sealag.whole_body._options import ControllerOptions, TaskError
-from sealag.whole_body._protocol import Measurement, StoringController, TickController
+from sealag.whole_body._protocol import (
+    Measurement,
+    StoringController,
+    TankController,
+    TickController,
+)
 from sealag.whole_body._stack import (
     RANK_TOLERANCE,
     WholeBodyStack,
     evaluate,
+    passive_stiffness,
     relative_asymmetry,
 )
 from sealag.whole_body._static_joint import StaticJointState, static_joint_state
@@ -35,6 +41,7 @@ __all__ = [
     "StaticJointState",
     "StiffnessForm",
     "StoringController",
+    "TankController",
     "TankFlow",
     "Task",
     "TaskError",
@@ -44,6 +51,7 @@ __all__ = [
     "WholeBodyStack",
     "evaluate",
     "linearise",
+    "passive_stiffness",
     "relative_asymmetry",
     "static_joint_state",
     "stiffness_matrix",

@@ -96,8 +96,9 @@ class Controller:
 
     @property
     def tank_energy(self) -> float:
-        """Energy left in the tank, J; never below 0."""
-        return self._tank.energy
+        """Energy left in the tank, J, never below 0; 0 if the law has none."""
+        tank = self.options.feedback is Feedback.STATIC_JOINT_TANK
+        return self._tank.energy if tank else 0.0
 
     @property
     def contraction(self) -> float:
@@ -152,7 +153,7 @@ class Controller:
             theta_dot = np.linalg.lstsq(self._space.J_star, rate, rcond=1e-6)[0]
             out += self._actuators.motor_damping * theta_dot
 
-    def storage(self, t: float, measurement: Measurement) -> float:
+    def storage(self, t: float, measurement: Measurement, command: Array) -> float:
         """Return V_3, the potential of the undelayed command, and the tank's energy, J.
 
         Its gradient in θ is minus the command, with J* and S frozen where they are:
@@ -164,8 +165,9 @@ class Controller:
         Args:
             t: instant at which the references are taken, s.
             measurement: the true state then.
+            command: where the undelayed command (n,) is written, without feedforward of θ̇_d, Nm.
         """
-        feedback, torque = self.options.feedback, np.zeros(self._robot.n)
+        feedback, torque = self.options.feedback, command
         self._refer(t)
         joints = measurement.q_joint if feedback is Feedback.JOINT else measurement.theta
         if feedback in (Feedback.STATIC_JOINT, Feedback.STATIC_JOINT_TANK):
@@ -180,6 +182,7 @@ class Controller:
             if self._tank.started:
                 carried = self._space.J_star @ (measurement.theta - self._theta)
                 self._error[:] = self._wanted - self._tank.position - carried
+            self._torque(torque)
         energy = 0.5 * float(self._error @ self._space.stiffness @ self._error)
         if feedback is Feedback.STATIC_JOINT:
             energy -= 0.5 * float(torque @ (torque / self._actuators.spring_stiffness))

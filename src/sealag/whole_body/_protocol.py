@@ -116,7 +116,7 @@ class TickController(Protocol):
 class StoringController(Protocol):
     """A controller that can state the potential it stores, for the passivity observer."""
 
-    def storage(self, t: float, measurement: Measurement) -> float:
+    def storage(self, t: float, measurement: Measurement, command: Array) -> float:
         """Return V_3 (and the tank's energy, where there is one) in J.
 
         The potential whose negative gradient in theta is the undelayed command, up to a constant.
@@ -124,5 +124,16 @@ class StoringController(Protocol):
         Args:
             t: Instant at which the references of the law are taken, s.
             measurement: The true state at that instant, not delayed.
+            command: Where the undelayed command (n,) is written, Nm.
         """
+        ...
+
+
+@runtime_checkable
+class TankController(Protocol):
+    """A controller whose energy tank pays for what its law does besides its potential."""
+
+    @property
+    def tank_energy(self) -> float:
+        """Return the energy left in the tank, J; 0 if the law has none."""
         ...

@@ -1,7 +1,9 @@
 """Contact-consistent operational space along a motion: J*, Λ and the fed-back stiffness."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from sealag.actuation import Actuators
 from sealag.errors import RobotError
 from sealag.robot import Contact, Motion, Robot, Stack, stack_terms
 from sealag.typing import Array
+from sealag.whole_body._options import TaskError
 from sealag.whole_body._tasks import Feedback, GravityCompensation, Hierarchy, TaskInertia
 
 RANK_TOLERANCE = 1e-9
@@ -29,7 +32,8 @@ class WholeBodyStack:
         J_star: (N, m, n) contact-consistent Jacobians J*_{i|prec(i)} of Eq. (10).
         Lambda: (N, m, m) task inertias, blocks of the levels on the diagonal.
         stiffness: (N, m, m) S of the form that is run, blocks likewise.
-        F_task: (N, n, n) Σ J*ᵀ S J*, joint-side stiffness of the tasks, Nm/rad.
+        F_task: (N, n, n) Σ J*ᵀ S J*, joint-side stiffness of the tasks, Nm/rad; with plain task
+            errors Σ J*_{k|prec}ᵀ S_k J_k overline(UN_s).
         F_gravity: (N, n, n) ∂ḡ/∂q_j along contact-consistent motions; 0 unless it is fed back.
         F_q: (N, n, n) F_task − F_gravity.
         F_theta: (N, n, n) −∂τ_osc/∂θ for the signal that is fed back.
@@ -73,6 +77,7 @@ def evaluate(
     motion: Motion,
     feedback: Feedback = Feedback.STATIC_JOINT,
     gravity: GravityCompensation = GravityCompensation.FEEDBACK,
+    task_error: TaskError = TaskError.CONSISTENT,
 ) -> WholeBodyStack:
     """Evaluate the whole-body controller's matrices at every instant of a motion.
 
@@ -87,6 +92,7 @@ def evaluate(
         motion: configurations and contacts.
         feedback: the signal that is fed back.
         gravity: where gravity compensation takes its configuration from.
+        task_error: which error tasks below the first level feed back.
 
     Returns:
         Stacked matrices in the motion's order.
@@ -100,16 +106,21 @@ def evaluate(
     m = levels[-1]
     J_star, Lambda, S = (np.zeros((count, m, k)) for k in (n, m, m))
     torque, F_gravity = np.zeros((count, n)), np.zeros((count, n, n))
+    moved = J_star if task_error is TaskError.CONSISTENT else np.zeros_like(J_star)
     for index, contacts in enumerate(motion.contact_sets):
         where = np.flatnonzero(motion.contact_index == index)
         if len(where) == 0:
             continue
         q = motion.q[where]
-        part = _operational_spaces(robot, hierarchy, q, contacts=contacts)
-        J_star[where], Lambda[where], S[where], torque[where] = (*part[:3], part[4])
+        at = _operational_spaces(robot, hierarchy, q, contacts=contacts)
+        J_star[where], Lambda[where], S[where], torque[where] = (
+            at.J_star, at.Lambda, at.stiffness, at.gravity,
+        )  # fmt: skip
+        if task_error is TaskError.PLAIN:
+            moved[where] = at.J_t @ at.along
         if gravity is GravityCompensation.FEEDBACK:
-            F_gravity[where] = _gravity_gradient(robot, q, contacts, directions=part[3])
-    F_task = J_star.transpose(0, 2, 1) @ S @ J_star
+            F_gravity[where] = _gravity_gradient(robot, q, contacts, directions=at.along)
+    F_task = J_star.transpose(0, 2, 1) @ S @ moved
     F_q = F_task - F_gravity
     root = np.sqrt(actuators.spring_stiffness)
     contraction = np.linalg.norm(F_q / root[:, None] / root[None, :], ord=2, axis=(1, 2))
@@ -152,21 +163,28 @@ def _motor_side(F_q: Array, K: Array, contraction: Array, *, feedback: Feedback)
     return F_theta.transpose(0, 2, 1)
 
 
+class _Spaces(NamedTuple):
+    """Operational spaces at N configurations with the same contacts."""
+
+    J_star: Array  # (N, m, n)
+    Lambda: Array  # (N, m, m)
+    stiffness: Array  # (N, m, m)
+    along: Array  # (N, nv, n) overline(UN_s)
+    gravity: Array  # (N, n)
+    lift: Array  # (N, m, nv) rows of Λ_k J_k P_k
+    J_t: Array  # (N, m, nv)
+
+
 def _operational_spaces(
     robot: Robot, hierarchy: Hierarchy, q: Array, *, contacts: Sequence[Contact]
-) -> tuple[Array, ...]:
-    """J*, Λ, S, overline(UN_s) and ḡ at configurations with the same contacts."""
-    rows = hierarchy.rows(robot)
-    stack = stack_terms(robot, q, contacts, rows=rows)
-    return _solve(robot, hierarchy, stack)
-
-
-def _solve(robot: Robot, hierarchy: Hierarchy, stack: Stack) -> tuple[Array, ...]:
+) -> _Spaces:
     from sealag.kernels.operational_space import allocate, operational_spaces
 
+    stack = stack_terms(robot, q, contacts, rows=hierarchy.rows(robot))
     count, c, nv = stack.J_s.shape
     m, n = stack.J_t.shape[1], robot.n
-    out = tuple(np.zeros((count, *shape)) for shape in ((m, n), (m, m), (m, m), (nv, n), (n,)))
+    shapes = ((m, n), (m, m), (m, m), (nv, n), (n,), (m, nv))
+    out = tuple(np.zeros((count, *shape)) for shape in shapes)
     bad = operational_spaces(
         stack.M,
         stack.g,
@@ -185,23 +203,81 @@ def _solve(robot: Robot, hierarchy: Hierarchy, stack: Stack) -> tuple[Array, ...
             f"The mass matrix of {robot.name} is not positive definite; "
             "a link that moves has no mass or no inertia."
         )
-    return out
+    return _Spaces._make([*out, stack.J_t])
+
+
+def passive_stiffness(
+    robot: Robot,
+    hierarchy: Hierarchy,
+    actuators: Actuators,
+    *,
+    q: Array,
+    contacts: Sequence[Contact],
+    feedback: Feedback,
+    gravity: GravityCompensation,
+    task_error: TaskError = TaskError.CONSISTENT,
+) -> Array:
+    """Return −∂τ_osc/∂q at fixed motor (or link) angles along what contacts leave free, (n, nv).
+
+    Where contacts and joints do not determine each other, as on a point foot, x depends on
+    passive motions of the base besides θ: δx = J* δθ + E (I − overline(UN_s) U) δq with the task
+    errors' Jacobian E. F_θ says nothing of them; the exact margin must. 0 where joints determine
+    all motions, and for the tank, whose x̂ moves with J* θ̇ alone.
+
+    Args:
+        robot: the robot.
+        hierarchy: its tasks.
+        actuators: its springs.
+        q: (nq,) configuration.
+        contacts: which frames are held.
+        feedback: the signal that is fed back.
+        gravity: where gravity compensation takes its configuration from.
+        task_error: which error tasks below the first level feed back.
+
+    Raises:
+        RobotError: the mass matrix is not positive definite.
+    """
+    n, nv = robot.n, robot.nv
+    if feedback is Feedback.STATIC_JOINT_TANK:
+        return np.zeros((n, nv))
+    at = _operational_spaces(robot, hierarchy, q[None], contacts=contacts)
+    free = np.eye(nv)
+    if len(J_s := robot.contact_jacobian(contacts, q)):
+        free -= np.linalg.pinv(J_s, rcond=RANK_TOLERANCE) @ J_s
+    passive = free - at.along[0] @ free[nv - n :]
+    J, S, E = at.J_star[0], at.stiffness[0], at.J_t[0].copy()
+    levels = hierarchy.levels(robot)
+    if task_error is TaskError.CONSISTENT:
+        for first, last in itertools.pairwise(levels[1:]):
+            E[first:last] -= at.J_t[0, first:last] @ at.lift[0, :first].T @ E[:first]
+    F = J.T @ S @ E @ passive
+    if gravity is GravityCompensation.FEEDBACK:
+        basis, sizes, _ = np.linalg.svd(passive)
+        basis = basis[:, sizes > 1e-9]
+        slope = _gravity_gradient(robot, q[None], contacts, directions=basis[None])[0]
+        F -= slope @ basis.T @ passive
+    if feedback is Feedback.STATIC_JOINT:
+        stack = J.T @ S @ E @ at.along[0]
+        if gravity is GravityCompensation.FEEDBACK:
+            stack -= _gravity_gradient(robot, q[None], contacts, directions=at.along)[0]
+        F = np.linalg.solve(np.eye(n) - stack / actuators.spring_stiffness, F)
+    return F
 
 
 def _gravity_gradient(
     robot: Robot, q: Array, contacts: Sequence[Contact], *, directions: Array
 ) -> Array:
-    """∂ḡ/∂q_j along dq = overline(UN_s) dq_j, by central differences of ḡ itself."""
-    count, n = len(q), robot.n
-    ahead = np.empty((n, 2, count, robot.nq))
+    """∂ḡ/∂q along the columns of directions (N, nv, p), by central differences of ḡ: (N, n, p)."""
+    count, n, p = len(q), robot.n, directions.shape[2]
+    ahead = np.empty((p, 2, count, robot.nq))
     for k in range(count):
-        for j in range(n):
+        for j in range(p):
             step = _STEP * directions[k, :, j]
             ahead[j, 0, k] = robot.integrate(q[k], step)
             ahead[j, 1, k] = robot.integrate(q[k], -step)
     stack = stack_terms(robot, ahead.reshape(-1, robot.nq), contacts, rows=())
-    hierarchy_free = _gravity_torques(robot, stack).reshape(n, 2, count, n)
-    return ((hierarchy_free[:, 0] - hierarchy_free[:, 1]) / (2.0 * _STEP)).transpose(1, 2, 0)
+    torques = _gravity_torques(robot, stack).reshape(p, 2, count, n)
+    return ((torques[:, 0] - torques[:, 1]) / (2.0 * _STEP)).transpose(1, 2, 0)
 
 
 def _gravity_torques(robot: Robot, stack: Stack) -> Array:
@@ -210,7 +286,8 @@ def _gravity_torques(robot: Robot, stack: Stack) -> Array:
 
     count, c, nv = stack.J_s.shape
     n = robot.n
-    out = tuple(np.zeros((count, *shape)) for shape in ((0, n), (0, 0), (0, 0), (nv, n), (n,)))
+    shapes = ((0, n), (0, 0), (0, 0), (nv, n), (n,), (0, nv))
+    out = tuple(np.zeros((count, *shape)) for shape in shapes)
     operational_spaces(
         stack.M,
         stack.g,
