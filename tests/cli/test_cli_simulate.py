@@ -38,13 +38,28 @@ def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, 
     assert answer["outcome"] == "completed"
     assert answer["energy_residual_j"] <= 1e-4 * max(answer["energy_throughput_j"], 1e-3)
     assert answer["joint_side_passive"] is True
+    stated = scenario != "track"  # a moving reference gives energy of its own
+    assert answer["delay_side_passive"] is (True if stated else None)
     recording = read_recording(out)
     joints = recording.signals["/joint_states"]
     assert joints.time[-1] == pytest.approx(0.5, abs=2e-3)
     assert np.isfinite(joints.values).all()
     assert "[robot]" in recording.attachments["project.toml"].decode()
     assert recording.metadata["outcome"] == "completed"
-    assert {"/tf", "/energy", "/torque/spring", "/delay"} <= set(recording.signals)
+    topics = {"/tf", "/energy", "/work", "/power/port", "/torque/spring", "/delay"}
+    assert topics <= set(recording.signals)
+    assert ("/contact" in recording.signals) == (robot != "baxter")
+    works, energy = recording.signals["/work"], recording.signals["/energy"]
+    rounding = 1e-12 * max(1.0, answer["energy_throughput_j"])
+    assert (np.diff(works.column("damping_j")) >= -rounding).all()
+    if stated:
+        assert energy.column("delay_line_j").max() == pytest.approx(answer["delay_storage_j"])
+        assert works.column("delay_side_slack_j")[-1] > -rounding
+    power = recording.signals["/power/port"].values.sum(axis=1)
+    steps = np.diff(works.time)
+    port = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * steps)])
+    given = works.column("port_j")
+    assert np.abs(port - given).max() <= 0.02 * np.abs(given).max() + 1e-9
 
 
 def test_walk_takes_its_steps(tmp_path, capsys):

@@ -160,5 +160,6 @@ def test_certified_design_stays_passive_under_pushes(tmp_path, seed):
     assert np.abs(run.v).max() < 1e3
     assert side.passive, (side.first_violation, side.joint, side.slack.min())
     assert run.audit.joint_side.passive
+    assert run.audit.delay_side.passive
     assert side.tolerance < 1e-2 * run.audit.scalar_flows["disturbance"][-1]
     assert run.audit.scalar_flows["disturbance"][-1] > 0

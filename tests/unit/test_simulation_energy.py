@@ -175,6 +175,9 @@ class TestPassivityObserver:
         assert audit.controller_side.first_violation is None
         assert audit.controller_storage[0] == pytest.approx(0.5 * 100 * 0.3**2)
         assert audit.delay_injection.max() > 0.1  # which the damping took
+        assert audit.delay_side.passive
+        # a law with a potential gives nothing, to the error of what is integrated from the log
+        assert np.abs(audit.law_injection).max() < audit.delay_side.tolerance < 2e-3
 
     def test_without_delay_nothing_is_injected(self, tmp_path):
         audit = self._run(tmp_path, 0.0).audit
@@ -189,6 +192,7 @@ class TestPassivityObserver:
         assert not side.passive
         assert side.joint == "joint0"
         assert 0.1 < side.first_violation < 3.0
+        assert not run.audit.delay_side.passive
         assert run.audit.joint_side.passive  # springs and motors are, whatever drives them
 
     def test_no_statement_without_storage(self, tmp_path):
@@ -198,3 +202,24 @@ class TestPassivityObserver:
         )
         run = closed_loop(robot, springs, ConstantTorque([1.0]), q=np.zeros(1), duration=0.05)
         assert run.audit.controller_side is None
+        assert run.audit.delay_side is None
+        assert run.audit.delay_injection is None
+
+    def test_a_law_without_a_potential_is_told_from_the_delay(self, tmp_path):
+        """Stiffness that is said to be half of what it is: the law gives, the delay does not."""
+
+        class Half(StoringPD):
+            def storage(self, t, measurement, command):
+                return 0.5 * super().storage(t, measurement, command)
+
+        robot = wheel(tmp_path, inertia=1.0)
+        springs = actuators(
+            robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=10.0
+        )
+        run = closed_loop(
+            robot, springs, Half(np.zeros(1), stiffness=100.0, motor=True),
+            q=np.array([0.3]), theta=np.array([0.3]), duration=0.5,
+        )  # fmt: skip
+        assert run.audit.law_injection.max() > 1.0
+        assert np.abs(run.audit.delay_injection).max() < 0.05
+        assert run.audit.delay_side.passive

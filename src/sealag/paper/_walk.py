@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sealag.delay import Delays, DelaySignal
 from sealag.design import System, Walking, walk_scene
 from sealag.locomotion import (
     Terrain,
@@ -35,33 +34,6 @@ SPEED_TOLERANCE = 0.20
 WIDTH_TOLERANCE = 0.25
 SETTLING = 2  # steps after which the gait counts
 _SIDE = (1.0, -1.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scaled:
-    """A delay times a factor.
-
-    Attributes:
-        signal: The delay.
-        factor: The factor, >= 0.
-    """
-
-    signal: DelaySignal
-    factor: float
-
-    @property
-    def upper_bound(self) -> float:
-        """Largest delay, s."""
-        return self.factor * self.signal.upper_bound
-
-    @property
-    def mean(self) -> float:
-        """Mean delay, s."""
-        return self.factor * self.signal.mean
-
-    def at(self, t: float | Array) -> float | Array:
-        """Return the delay at ``t`` (s)."""
-        return self.factor * self.signal.at(t)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,7 +183,7 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
         theta=theta,
         theta_dot=v[-robot.n :],
         duration=_walking(case).duration,
-        network=_network(system.delays, case.delay_scale),
+        network=Network.from_delays(system.delays.scaled(case.delay_scale)),
         clock=Clock(physics=case.physics, embedded=case.embedded, central=TICK),
         scene=walk_scene(_walking(case), case.pushes),
         seed=case.seed,
@@ -235,16 +207,6 @@ class _Witness:
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
         self._seen.tick(t, measurement, out)
         self._asked.append(self._controller.tau_task.copy())
-
-
-def _network(delays: Delays, factor: float) -> Network:
-    return Network.from_delays(
-        replace(
-            delays,
-            central=Scaled(signal=delays.central, factor=factor),
-            embedded=Scaled(signal=delays.embedded, factor=factor),
-        )
-    )
 
 
 def _walking(case: WalkCase) -> Walking:
