@@ -25,7 +25,13 @@ def run(capsys, *arguments):
 
 @pytest.mark.parametrize(
     ("robot", "scenario"),
-    [("baxter", "balance"), ("anymal", "drop"), ("anymal", "track"), ("talos", "regulate")],
+    [
+        ("baxter", "balance"),
+        ("anymal", "drop"),
+        ("anymal", "track"),
+        ("talos", "regulate"),
+        ("anymal_crawl", "balance"),
+    ],
 )
 def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, capsys):
     out = tmp_path / "run.mcap"

@@ -21,6 +21,7 @@ from sealag.simulation import (
     Scene,
     closed_loop,
     require_hold,
+    touching_posture,
 )
 
 FEET = ("left_foot", "right_foot")
@@ -42,6 +43,18 @@ def springs(hume):
     )
 
 
+class _FailsAfterStart(JointPD):
+    """Answers while the rest is sought, fails in the loop's first tick."""
+
+    answers = 2
+
+    def tick(self, t, measurement, out):
+        self.answers -= 1
+        if self.answers < 0:
+            raise ContractionError("the task is stiffer than the springs")
+        super().tick(t, measurement, out)
+
+
 def _posture(robot, clearance=0.0, knee=55):
     q = robot.configuration(np.deg2rad([0, -25, knee, 0, -25, knee]))
     low = min(robot.frame_placement(foot, q)[1][2] for foot in FEET)
@@ -58,6 +71,44 @@ def _run(robot, springs, q, controller=None, **options):
     options.setdefault("duration", 0.2)
     controller = controller or JointPD(q[-6:], stiffness=300.0, damping=2.0)
     return closed_loop(robot, springs, controller, q=q, **options)
+
+
+class TestStart:
+    def test_rounded_joint_angles_are_led_to_the_ground(self, hume):
+        q = _posture(hume)
+        q[-3:] += [2e-3, -1e-3, 3e-3]
+        gaps = [hume.frame_placement(foot, q)[1][2] for foot in FEET]
+        assert abs(gaps[0] - gaps[1]) > 1e-4  # without help one foot is in the air
+        stands = touching_posture(hume, q, _feet(), ground=FlatGround())
+        heights = [hume.frame_placement(foot, stands)[1][2] for foot in FEET]
+        assert np.abs(heights).max() < 1e-9
+        assert np.abs(hume.difference(q, stands)).max() < 2 * abs(gaps[0] - gaps[1])
+
+    def test_a_touching_posture_stays(self, hume):
+        stands = touching_posture(hume, _posture(hume), _feet(), ground=FlatGround())
+        again = touching_posture(hume, stands, _feet(), ground=FlatGround())
+        np.testing.assert_allclose(again, stands, rtol=0, atol=1e-9)
+
+    def test_a_foot_in_the_air_is_named(self, hume):
+        q = _posture(hume)
+        q[-1] += 0.3
+        with pytest.raises(InputError, match=r"foot right_foot is .* mm above .* left_foot"):
+            touching_posture(hume, q, _feet(), ground=FlatGround())
+
+    def test_springs_at_rest_under_a_command_stiffer_than_they_are(self, hume, springs):
+        q = _posture(hume)
+        controller = JointPD(q[-6:] + 0.01, stiffness=3000.0, offset=5.0, motor=True)
+        run = _run(hume, springs, q, controller, duration=2e-3)
+        carried = springs.spring_stiffness * (run.theta[0] - q[-6:])
+        np.testing.assert_allclose(carried, run.tau_osc[0], rtol=0, atol=1e-6)
+        assert np.abs(carried).max() > 1.0
+
+    def test_a_controller_that_fails_at_once_leaves_the_first_instant(self, hume, springs):
+        q = _posture(hume)
+        run = _run(hume, springs, q, _FailsAfterStart(q[-6:], stiffness=1.0))
+        assert run.outcome is Outcome.CONTROLLER_FAILED
+        assert run.time.tolist() == [0.0]
+        np.testing.assert_array_equal(run.q[0], q)
 
 
 class TestRefused:

@@ -24,6 +24,7 @@ from sealag.simulation import (
     Scene,
     closed_loop,
     require_hold,
+    touching_posture,
 )
 from sealag.typing import Array
 from sealag.whole_body import Controller, ControllerOptions, TaskKind, TickController
@@ -83,9 +84,10 @@ def simulate(
     if kind == "walk":
         return _walk(system, common)
     feet = _feet(system)
-    q = _on_ground(system)
     scene = Scene(feet=feet, pushes=_pushes(system, kind), fall=_FALL)
+    q = system.posture.copy()
     if system.robot.floating_base and system.contacts:
+        q = touching_posture(system.robot, q, feet, ground=scene.ground)
         require_hold(
             system.robot,
             q,
@@ -240,16 +242,6 @@ def _feet(system: System) -> list[Foot]:
         )
         for contact in system.contacts
     ]
-
-
-def _on_ground(system: System) -> Array:
-    """The posture with its lowest contact frame as high as a touching foot."""
-    q = system.posture.copy()
-    if system.robot.floating_base and system.contacts:
-        q[2] += system.simulation.foot_radius - min(
-            system.robot.frame_placement(contact.frame, q)[1][2] for contact in system.contacts
-        )
-    return q
 
 
 def _pushes(system: System, kind: str) -> list[Push]:

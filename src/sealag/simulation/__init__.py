@@ -2,7 +2,7 @@
 
 from sealag.simulation._audit import Audit, Passivity
 from sealag.simulation._ground import FlatGround, Foot, Ground
-from sealag.simulation._hold import Hold, require_hold, static_hold
+from sealag.simulation._hold import Hold, require_hold, static_hold, touching_posture
 from sealag.simulation._loop import closed_loop
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import EventKind, Outcome, PlantStop
@@ -31,4 +31,5 @@ __all__ = [
     "closed_loop",
     "require_hold",
     "static_hold",
+    "touching_posture",
 ]

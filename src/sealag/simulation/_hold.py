@@ -11,6 +11,9 @@ from sealag.simulation._ground import Foot, Ground, contact_frame
 from sealag.typing import Array
 
 _TOUCHING = 1e-4  # m
+_FAR = 0.01  # m: further from the ground than a rounded posture leaves a foot
+_EXACT = 1e-10  # m
+_ROUNDS = 30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +53,8 @@ def static_hold(
         InputError: The base floats and no foot touches the ground.
         SolverError: The linear program could not be solved.
     """
-    J, mu, touching = _points(robot, q, feet, ground)
+    J, mu, gap = _points(robot, q, feet, ground)
+    touching = np.abs(gap) < _TOUCHING
     if robot.nv_base and not touching.any():
         raise InputError("no foot touches the ground; move the base down or give contacts")
     columns = int(touching.sum())
@@ -100,11 +104,51 @@ def require_hold(
     return hold
 
 
+def touching_posture(robot: Robot, q: Array, feet: Sequence[Foot], *, ground: Ground) -> Array:
+    """Return the nearest posture in which every contact point touches the ground.
+
+    The base is lowered until the first point touches; what gaps are left, as a posture of rounded
+    joint angles has them, are closed by Newton steps of least norm in q.
+
+    Args:
+        robot: The robot.
+        q: Configuration (nq,).
+        feet: Its feet.
+        ground: The terrain.
+
+    Raises:
+        InputError: A point is more than 10 mm from the ground when another one touches, or no
+            posture nearby lets all of them touch.
+    """
+    q = q.copy()
+    gap = _points(robot, q, feet, ground)[2]
+    q[2] -= gap.min()
+    gap = _points(robot, q, feet, ground)[2]
+    if gap.max() > _FAR:
+        per_foot = np.split(gap, np.cumsum([len(foot.offsets()) for foot in feet])[:-1])
+        names = [foot.contact.frame for foot in feet]
+        lowest, highest = (names[int(np.argmin([f.min() for f in per_foot]))],
+                           names[int(np.argmax([f.max() for f in per_foot]))])  # fmt: skip
+        raise InputError(
+            f"foot {highest} is {gap.max() * 1e3:.3g} mm above the ground when {lowest} touches "
+            "it: correct the posture's joints, or leave out the contact that is in the air"
+        )
+    for _ in range(_ROUNDS):
+        J, _, gap = _points(robot, q, feet, ground)
+        if np.abs(gap).max() < _EXACT:
+            return q
+        q = robot.integrate(q, -np.linalg.lstsq(J[:, 2], gap, rcond=1e-9)[0])
+    raise InputError(
+        f"the feet {', '.join(foot.contact.frame for foot in feet)} cannot all touch the ground "
+        "near this posture: correct its joints"
+    )
+
+
 def _points(
     robot: Robot, q: Array, feet: Sequence[Foot], ground: Ground
 ) -> tuple[Array, Array, Array]:
-    """Contact-frame Jacobians (P, 3, nv), friction (P,) and which points touch (P,)."""
-    rows, mu, touching = [], [], []
+    """Contact-frame Jacobians (P, 3, nv), friction (P,) and gaps above the ground (P,), m."""
+    rows, mu, gaps = [], [], []
     for foot in feet:
         R, p = robot.frame_placement(foot.contact.frame, q)
         J = robot.frame_jacobian(foot.contact.frame, q)
@@ -114,12 +158,12 @@ def _points(
             turn = np.array([[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]])
             rows.append(contact_frame(ground, x, y) @ (J[:3] + turn @ J[3:]))
             mu.append(foot.friction)
-            touching.append(abs(z - foot.radius - ground.height(x, y)) < _TOUCHING)
+            gaps.append(z - foot.radius - ground.height(x, y))
     count = len(rows)
     return (
         np.array(rows).reshape(count, 3, robot.nv),
         np.array(mu),
-        np.array(touching, dtype=bool),
+        np.array(gaps),
     )
 
 

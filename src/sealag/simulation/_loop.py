@@ -25,6 +25,8 @@ from sealag.whole_body import (
 )
 
 _WATCH = 5e-3  # s between two looks for a fall
+_AT_REST = 1e-12  # rad: how far the first motor angles may be from rest
+_ROUNDS = 50
 _LONGEST = 100.0  # rad: a spring deflection beyond any physical range
 
 
@@ -159,23 +161,19 @@ class _Loop:
                 _state(name, value, n)
         self.plant.start(q, v, theta=theta, theta_dot=theta_dot)
         first = np.zeros(n)
-        guess = q[-n:].copy() if theta is None else np.asarray(theta, dtype=float)
-        for _ in range(1 if theta is not None else 50):
+
+        def answer(angles: Array) -> Array:
             self._sense(0.0)
-            truth.theta[:], truth.tau_sea[:] = guess, stiffness * (guess - q[-n:])
+            truth.theta[:], truth.tau_sea[:] = angles, stiffness * (angles - q[-n:])
             self.controller.reset(0.0, truth)
             self.controller.tick(0.0, truth, first)
-            if theta is None:
-                moved = float(np.abs(q[-n:] + first / stiffness - guess).max(initial=0.0))
-                guess = q[-n:] + first / stiffness
-                if moved < 1e-12:
-                    break
-        if not np.isfinite(guess).all():
-            raise InputError(
-                "the springs have no rest under the controller's first command; give theta"
-            )
+            return q[-n:] + first / stiffness
+
         if theta is None:
+            guess = self._rest(answer, q[-n:].copy())
             self.plant.start(q, v, theta=guess, theta_dot=theta_dot)
+        else:
+            answer(np.asarray(theta, dtype=float))
         self._sense(0.0)
         self.controller.reset(0.0, truth)
         self._up.fill(truth.data)
@@ -186,6 +184,25 @@ class _Loop:
         if self._torque is not None:
             self._torque.fill(self._torque_held)
         self._fall_reference()
+
+    def _rest(self, answer: Callable[[Array], Array], guess: Array) -> Array:
+        """Motor angles at which the springs carry the command that these angles call forth."""
+        from scipy.optimize import root
+
+        first = guess
+        for _ in range(_ROUNDS):
+            guess, last = answer(guess), guess
+            if not np.isfinite(guess).all():
+                break
+            if np.abs(guess - last).max(initial=0.0) < _AT_REST:
+                return guess
+        # A command that is stiffer than the springs: the iteration leads away from the rest.
+        found = root(lambda angles: answer(angles) - angles, first, tol=_AT_REST)
+        if not (np.isfinite(found.x).all() and np.abs(found.fun).max() < 1e3 * _AT_REST):
+            raise InputError(
+                "the springs have no rest under the controller's first command; give theta"
+            )
+        return answer(found.x)
 
     def _fall_reference(self) -> None:
         if self.robot.nv_base == 6 and self.scene.fall is not None:
@@ -201,7 +218,7 @@ class _Loop:
     def run(
         self, duration: float, log_period: float, progress: Callable[[float], None] | None
     ) -> Run:
-        """Simulate and log until the end, whatever ends it."""
+        """Simulate and log until the end, whatever ends it; the first instant is always logged."""
         if not (math.isfinite(duration) and duration > 0):
             raise InputError(f"the duration must be a time > 0 s, got {duration}")
         steps = round(duration / self.clock.physics)
@@ -231,6 +248,8 @@ class _Loop:
             message = f"at t = {self.plant.time:.4f} s: {error}"
         except KeyboardInterrupt:
             outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
+        if not log.filled:
+            self._record(log)
         return self._result(log, outcome, message)
 
     def _control(self, i: int) -> None:
