@@ -8,6 +8,7 @@ import numpy as np
 from sealag.design import certify, load
 from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.paper import (
+    AblationTable,
     DelayMap,
     WalkCase,
     delay_map,
@@ -24,6 +25,7 @@ from sealag.report import (
     energy_section,
     figure_5_section,
     limits_section,
+    means_section,
     walk_section,
     write_paper_page,
 )
@@ -52,10 +54,15 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
     walk = simulate_walk(system, WalkCase(steps=2))
     rows = walk_success({"default": WalkCase(steps=1)}, [paper_terrain()])
     delays = delay_map(motion, stiffnesses=[350.0], scales=[1.0, 6.0], terrains=1)
+    everywhere = AblationTable(
+        means=("everything", "no lead"), conditions=("K = 200", "α = 2", "no delay"), terrains=7,
+        walked=np.array([[7, 6, 5], [4, 3, 2]]), gaits=np.array([[6, 5, 4], [1, 1, 0]]),
+    )  # fmt: skip
     certificate = certify(system, motion, time_varying=True)
     traces = figure_5(betas=[0.5], jobs=2)
     extra = [
-        walk_section(system.robot, walk, rows, rows, rows),
+        walk_section(system.robot, walk, rows, rows),
+        means_section(rows, everywhere, rows),
         energy_section(walk, certificate),
         limits_section(figure, figure, rows, delays),
         figure_5_section(traces, system.robot.joints),
@@ -70,7 +77,8 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
     links.feed(text)
     assert links.outside == []
     assert set(links.anchors) >= {
-        "claims", "figure4", "certified", "unsafe", "walk", "energy", "limits", "figure5", "beyond",
+        "claims", "figure4", "certified", "unsafe", "walk", "means", "energy", "limits", "figure5",
+        "beyond",
     }  # fmt: skip
     assert set(links.anchors) - {a for a in links.anchors if a.startswith(("m", "p"))} <= links.ids
     assert 'name="viewport"' in text
@@ -79,6 +87,7 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
     assert "<canvas" in text
     assert f"{delays.first_crossing[0] * 1e3:.1f}" in text
     assert f"{certificate.time_varying_delay_s * 1e3:.2f} ms" in text
+    assert [cell in text for cell in (">7 / 6<", ">3 / 1<", ">2 / 0<")] == [True] * 3
     assert f"{walk.run.audit.closure:.1e}" in text
     assert delays.walked.tolist() == [[1, 0]]  # the paper's delays, and six times as long ones
     assert f"{figure.delay_s[1][3] * 1e3:.1f}" in text

@@ -10,12 +10,14 @@ from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.paper import (
     HELD_OUT,
     ablation_cases,
+    ablation_table,
     delay_map,
     figure_4,
     figure_4_claims,
     figure_5,
     figure_5_claims,
     gain_cases,
+    gait_cases,
     random_plant_table,
     robustness_cases,
     rough_terrains,
@@ -30,6 +32,7 @@ from sealag.report import (
     energy_section,
     figure_5_section,
     limits_section,
+    means_section,
     walk_section,
     write_paper_page,
     write_run,
@@ -55,6 +58,8 @@ def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
     held_out = walk_success(robustness_cases(steps=20), fresh, jobs=2)
     progress("[6/7] leaving out each means, varying gains and delays, stairs, pushes; Fig. 5")
     ablations = walk_success(ablation_cases(), rough_terrains(4), jobs=2)
+    gait = walk_success(gait_cases(), rough_terrains(4), jobs=2)
+    everywhere = ablation_table(rough_terrains(2), jobs=2)
     gains = walk_success(gain_cases(), rough_terrains(4), jobs=2)
     delays, beyond = delay_map(motion, jobs=2), walk_beyond(jobs=2)
     certificate = certify(system, motion, time_varying=True)
@@ -63,7 +68,8 @@ def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
     claims = (*figure_4_claims(figure), *figure_5_claims(traces))
     progress("[7/7] writing the page")
     extra = [
-        walk_section(system.robot, walk, robust, held_out, ablations),
+        walk_section(system.robot, walk, robust, held_out),
+        means_section(ablations, everywhere, gait),
         energy_section(walk, certificate),
         limits_section(figure, simulated, gains, delays),
         figure_5_section(traces, system.robot.joints),

@@ -1,5 +1,11 @@
 """The paper's figures and statements, computed here and checked one by one."""
 
+from sealag.paper._ablation import (
+    AblationTable,
+    ablation_cases,
+    ablation_table,
+    gait_cases,
+)
 from sealag.paper._beyond import HELD_OUT, DelayMap, beyond_cases, delay_map, walk_beyond
 from sealag.paper._claims import Claim, Verdict
 from sealag.paper._figure4 import (
@@ -16,7 +22,6 @@ from sealag.paper._walk import Walk, WalkCase, measure_walk, simulate_walk
 from sealag.paper._walk_errors import SensorNoise
 from sealag.paper._walk_table import (
     WalkRow,
-    ablation_cases,
     gain_cases,
     robustness_cases,
     rough_terrains,
@@ -25,6 +30,7 @@ from sealag.paper._walk_table import (
 
 __all__ = [
     "HELD_OUT",
+    "AblationTable",
     "CertifiedVariant",
     "Claim",
     "DelayMap",
@@ -38,6 +44,7 @@ __all__ = [
     "WalkCase",
     "WalkRow",
     "ablation_cases",
+    "ablation_table",
     "beyond_cases",
     "delay_map",
     "figure_4",
@@ -45,6 +52,7 @@ __all__ = [
     "figure_5",
     "figure_5_claims",
     "gain_cases",
+    "gait_cases",
     "measure_walk",
     "measured_lag",
     "random_plant_table",

@@ -1,4 +1,4 @@
-"""Success tables of the walk: terrains, gains, delays, and every means left out once."""
+"""Success tables of the walk: terrains, gains, delays."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from sealag.design import System, load
-from sealag.locomotion import Prediction, Terrain, WalkingOptions, rough_terrain
+from sealag.locomotion import Terrain, WalkingOptions, rough_terrain
 from sealag.paper._walk import Walk, WalkCase, simulate_walk
 from sealag.paper._walk_errors import SensorNoise
 
@@ -155,44 +155,6 @@ def robustness_cases(*, steps: int = 20) -> dict[str, WalkCase]:
         "5 % model error": replace(case, model_error=0.05),
         "noise and 5 % model error": replace(case, noise=noise, model_error=0.05),
     }
-
-
-def ablation_cases(*, steps: int = 7) -> dict[str, WalkCase]:
-    """Return the default walk with each means left out, and the published law.
-
-    Args:
-        steps: Number of steps.
-    """
-    left_out = {
-        "everything": {},
-        "no preview": {"preview": False},
-        "prediction: constant velocity": {"prediction": Prediction.VELOCITY},
-        "no prediction": {"prediction": Prediction.NONE},
-        "no velocity feedforward": {"velocity_feedforward": False},
-        "no lead": {"lead": False},
-        "no acceleration feedforward": {"acceleration_feedforward": False},
-        "no position term in the planned velocity": {"position_rate": 0.0},
-        "no torque feedback": {"torque_feedback": 0.0},
-        "no task damping": {"task_damping": 0.0},
-        "footsteps by CoM velocity": {"momentum_placement": False},
-        "no correction of constant errors": {"bias_gain": 0.0},
-        "no averaging of the placement": {"placement_time": 0.0},
-        "no early touchdown": {"early_contact": False},
-    }
-    cases = {
-        name: WalkCase(steps=steps, options=WalkingOptions(**change))
-        for name, change in left_out.items()
-    }
-    whole = cases["everything"]
-    gait = replace(whole.gait, transfer_time=1e-3)
-    cases["no weight transfer"] = replace(whole, gait=gait)
-    law = WalkingOptions.published()
-    cases["published law"] = replace(whole, options=law)
-    cases["published law, link-side feedback"] = replace(
-        whole, options=WalkingOptions.published(feedback="joint")
-    )
-    cases["published law, no delay"] = replace(whole, options=law, delay_scale=0.0)
-    return cases
 
 
 def gain_cases(*, steps: int = 7) -> dict[str, WalkCase]:

@@ -1,0 +1,150 @@
+"""What each of the walking controller's means is worth: each left out, wherever it may matter."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sealag.design import load
+from sealag.locomotion import Prediction, Terrain, WalkingOptions
+from sealag.paper._walk import WalkCase
+from sealag.paper._walk_table import walk_success
+from sealag.typing import IntArray
+
+LEFT_OUT: Mapping[str, Mapping[str, Any]] = {
+    "everything": {},
+    "no preview": {"preview": False},
+    "prediction: constant velocity": {"prediction": Prediction.VELOCITY},
+    "no prediction": {"prediction": Prediction.NONE},
+    "no velocity feedforward": {"velocity_feedforward": False},
+    "no lead": {"lead": False},
+    "no acceleration feedforward": {"acceleration_feedforward": False},
+    "no position term in the planned velocity": {"position_rate": 0.0},
+    "no torque feedback": {"torque_feedback": 0.0},
+    "no task damping": {"task_damping": 0.0},
+    "footsteps by CoM velocity": {"momentum_placement": False},
+    "no correction of constant errors": {"bias_gain": 0.0},
+    "no averaging of the placement": {"placement_time": 0.0},
+    "no early touchdown": {"early_contact": False},
+}
+
+_TRIAL: Mapping[str, Any] = {
+    "prediction": Prediction.VELOCITY,
+    "momentum_placement": False,
+    "task_damping": 0.0,
+    "torque_feedback": 0.0,
+    "bias_gain": 0.0,
+    "placement_time": 0.0,
+    "position_rate": 0.0,
+}
+_MODEL = "prediction with the model"
+_MOMENTUM = "footsteps by angular momentum"
+_SUPPLIED: Mapping[str, tuple[str, ...]] = {
+    "pendulum, constant velocity": (),
+    _MODEL: ("prediction",),
+    _MOMENTUM: ("momentum_placement",),
+    f"{_MODEL}, {_MOMENTUM}": ("prediction", "momentum_placement"),
+}
+
+
+def ablation_cases(*, steps: int = 7) -> dict[str, WalkCase]:
+    """Return the default walk with each means left out, and the published law.
+
+    Args:
+        steps: Number of steps.
+    """
+    cases = {
+        name: WalkCase(steps=steps, options=WalkingOptions(**change))
+        for name, change in LEFT_OUT.items()
+    }
+    whole = cases["everything"]
+    gait = replace(whole.gait, transfer_time=1e-3)
+    cases["no weight transfer"] = replace(whole, gait=gait)
+    law = WalkingOptions.published()
+    cases["published law"] = replace(whole, options=law)
+    cases["published law, link-side feedback"] = replace(
+        whole, options=WalkingOptions.published(feedback="joint")
+    )
+    cases["published law, no delay"] = replace(whole, options=law, delay_scale=0.0)
+    return cases
+
+
+def gait_cases(*, steps: int = 7) -> dict[str, WalkCase]:
+    """Return walks that tell what makes the walk a gait, with two spring stiffnesses.
+
+    They begin with the few means that suffice not to fall (preview at constant velocity, footsteps
+    by the pendulum's CoM velocity, feedforward, lead) and get the model's prediction and the
+    placement by angular momentum, one at a time and both.
+
+    Args:
+        steps: Number of steps.
+    """
+    cases = {}
+    for K in (1000.0, 350.0):
+        for name, supplied in _SUPPLIED.items():
+            change = {key: value for key, value in _TRIAL.items() if key not in supplied}
+            cases[f"K = {K:g} Nm/rad: {name}"] = WalkCase(
+                steps=steps, spring_stiffness=K, options=WalkingOptions(**change)
+            )
+    return cases
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AblationTable:
+    """Each means left out under each condition.
+
+    Attributes:
+        means: (M,) what was left out.
+        conditions: (C,) what was varied.
+        terrains: number of grounds at each point.
+        walked: (M, C) how many were walked without a fall.
+        gaits: (M, C) how many walks were gaits.
+    """
+
+    means: tuple[str, ...]
+    conditions: tuple[str, ...]
+    terrains: int
+    walked: IntArray
+    gaits: IntArray
+
+
+def ablation_table(
+    terrains: Sequence[Terrain], *, project: str = "bundled:hume", steps: int = 7, jobs: int = 1
+) -> AblationTable:
+    """Leave out each means over spring stiffness, α, β and delay scale.
+
+    Args:
+        terrains: the grounds.
+        project: the project file.
+        steps: number of steps.
+        jobs: number of processes.
+    """
+    way = 0.5 * load(project).delays.embedded.mean
+    conditions: dict[str, dict[str, float]] = {
+        "K = 200": {"spring_stiffness": 200.0},
+        "K = 1000": {"spring_stiffness": 1000.0},
+        "α = 0.3": {"damping_scale": 0.3},
+        "α = 2": {"damping_scale": 2.0},
+        "β = 0.1": {"inertia_shaping": 0.1},
+        "β = 2": {"inertia_shaping": 2.0},
+        "no delay": {"delay_scale": 0.0},
+        "delays × 2": {"delay_scale": 2.0},
+    }
+    means = ablation_cases(steps=steps)
+    means = {name: case for name, case in means.items() if not name.startswith("published law,")}
+    cases = {}
+    for name, case in means.items():
+        for condition, change in conditions.items():
+            scale = change.get("delay_scale", 1.0)
+            options = replace(case.options, embedded_delay=way * scale + 1e-3)
+            cases[f"{name}, {condition}"] = replace(case, options=options, **change)
+    rows = walk_success(cases, terrains, project=project, jobs=jobs)
+    shape = (len(means), len(conditions))
+    return AblationTable(
+        means=tuple(means),
+        conditions=tuple(conditions),
+        terrains=len(terrains),
+        walked=np.array([row.walked for row in rows]).reshape(shape),
+        gaits=np.array([row.gaits for row in rows]).reshape(shape),
+    )
