@@ -18,7 +18,7 @@ FIELDS = {
     "stable", "local_margin_s", "first_crossing_s", "unstable_modes", "assumptions",
 }  # fmt: skip
 DESIGNS = ["bundled:hume", *(f"{ROOT}/examples/{n}.toml" for n in
-           ("anymal", "anymal_crawl", "talos", "baxter"))]  # fmt: skip
+           ("anymal", "anymal_crawl", "talos", "baxter", "hume_held"))]  # fmt: skip
 
 
 def run(capsys, *arguments):

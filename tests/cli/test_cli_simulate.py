@@ -31,6 +31,7 @@ def run(capsys, *arguments):
         ("anymal", "track"),
         ("talos", "regulate"),
         ("anymal_crawl", "balance"),
+        ("hume_held", "drop"),
     ],
 )
 def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, capsys):
@@ -54,7 +55,8 @@ def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, 
     assert recording.metadata["outcome"] == "completed"
     topics = {"/tf", "/energy", "/work", "/power/port", "/torque/spring", "/delay"}
     assert topics <= set(recording.signals)
-    assert ("/contact" in recording.signals) == (robot != "baxter")
+    fixed = robot in ("baxter", "hume_held")
+    assert ("/contact" in recording.signals) != fixed
     works, energy = recording.signals["/work"], recording.signals["/energy"]
     rounding = 1e-12 * max(1.0, answer["energy_throughput_j"])
     assert (np.diff(works.column("damping_j")) >= -rounding).all()
@@ -109,9 +111,22 @@ def test_same_seed_same_run(tmp_path, capsys):
     assert not np.array_equal(ages[0], ages[2])
 
 
-def test_a_fall_is_a_named_result(tmp_path, capsys):
+def test_a_biped_on_point_feet_balances_by_stepping(tmp_path, capsys):
     code, text, _ = run(
-        capsys, "bundled:hume", "--scenario", "balance", "--out", tmp_path / "r.mcap", "--json"
+        capsys, "bundled:hume", "--scenario", "balance", "--duration", "3",
+        "--out", tmp_path / "r.mcap", "--json",
+    )  # fmt: skip
+    answer = json.loads(text)
+    assert code == 0
+    assert answer["outcome"] == "completed"
+    assert answer["touchdowns"] >= 7
+    assert answer["joint_side_passive"] is True
+
+
+def test_a_fall_is_a_named_result(tmp_path, capsys):
+    """Two point feet without a step: the pose is an inverted pendulum."""
+    code, text, _ = run(
+        capsys, "bundled:hume", "--scenario", "regulate", "--out", tmp_path / "r.mcap", "--json"
     )
     answer = json.loads(text)
     assert code == 0

@@ -11,7 +11,7 @@ from sealag.design._criteria import certified_bounds
 from sealag.design._system import System
 from sealag.design._walking import Walking
 from sealag.errors import InputError, either
-from sealag.locomotion import begin_walk
+from sealag.locomotion import FlatTerrain, begin_walk
 from sealag.passivity import DelayStorage, joint_multiplier
 from sealag.robot import Contact, ContactKind
 from sealag.simulation import (
@@ -31,9 +31,12 @@ from sealag.whole_body import Controller, ControllerOptions, TaskKind, TickContr
 
 SCENARIOS = ("regulate", "track", "drop", "balance", "walk")
 LONGEST_STEP = 1e-3
-"""Physics step and central period where the project states none, s."""
+"""Longest physics step, and central period where the project states none, s."""
+STEPS_PER_SWING = 8
+"""Least number of physics steps in a period of the fastest spring."""
 
 _FALL = FallLimits()
+_SPOT_SPEED = 1e-3  # m/s
 
 
 def simulate(
@@ -48,9 +51,11 @@ def simulate(
     """Run a design's whole-body controller on the delayed robot, with contacts and energy audit.
 
     Scenarios: `regulate` holds the posture while the project's pushes act; `balance` does so with
-    a push of 5 % of the weight for 0.1 s if the project has none; `track` moves the first task's
-    first row as a sinusoid; `drop` begins above the ground with the springs at rest; `walk` takes
-    the steps of the project's [walking] section.
+    a push of 5 % of the weight for 0.1 s if the project has none, or, if the project has a
+    [walking] section, by stepping on the spot on flat ground, since a biped on point feet cannot
+    stand; `track` moves the first task's first row as a sinusoid; `drop` begins above the ground,
+    or, with a fixed base, with springs that do not yet carry the joints; `walk` takes the steps of
+    the project's [walking] section.
 
     Args:
         system: the design.
@@ -81,8 +86,10 @@ def simulate(
         "seed": setting.seed if seed is None else seed,
         "progress": progress,
     }
-    if kind == "walk":
-        return _walk(system, common)
+    if kind == "walk" or (kind == "balance" and system.walking is not None):
+        walking = _walking(system)
+        walking = walking if kind == "walk" else _on_the_spot(walking)
+        return _walk(system, walking, _pushes(system, kind), common)
     feet = _feet(system)
     scene = Scene(feet=feet, pushes=_pushes(system, kind), fall=_FALL)
     q = system.posture.copy()
@@ -96,15 +103,18 @@ def simulate(
             torque_limit=system.actuators.torque_limit,
         )
     controller = _controller(system, kind, q)
-    held = q
+    held, theta = q, None
     if kind == "drop" and system.robot.floating_base:
         q = q.copy()
         q[2] += setting.drop_height
+    elif kind == "drop":
+        theta = system.robot.joint_positions(q)
     run = closed_loop(
         system.robot,
         system.actuators,
         controller,
         q=q,
+        theta=theta,
         scene=scene,
         **common,
     )
@@ -166,8 +176,12 @@ def walk_scene(walking: Walking, pushes: Sequence[Push] = ()) -> Scene:
     return Scene(feet=feet, ground=walking.terrain, pushes=pushes)
 
 
-def _walk(system: System, common: dict[str, Any]) -> Run:
-    walking = _walking(system)
+def _on_the_spot(walking: Walking) -> Walking:
+    gait = replace(walking.gait, apex_speed=_SPOT_SPEED)
+    return replace(walking, gait=gait, terrain=FlatTerrain())
+
+
+def _walk(system: System, walking: Walking, pushes: Sequence[Push], common: dict[str, Any]) -> Run:
     controller, q, v, theta = begin_walk(
         system.robot,
         system.actuators,
@@ -185,7 +199,7 @@ def _walk(system: System, common: dict[str, Any]) -> Run:
         v=v,
         theta=theta,
         theta_dot=v[-system.robot.n :],
-        scene=walk_scene(walking, _pushes(system, "walk")),
+        scene=walk_scene(walking, pushes),
         **common,
     )
 
@@ -263,7 +277,8 @@ def _pushes(system: System, kind: str) -> list[Push]:
 
 
 def _clock(system: System) -> Clock:
-    """The design's own periods; 1 ms for a continuous controller, and physics at 1 ms at most."""
+    """The design's own periods; 1 ms for a continuous controller, and physics fine enough for the
+    springs."""
     delays = system.delays
     central = delays.sample_time or delays.embedded_period or LONGEST_STEP
     embedded = delays.embedded_period
@@ -271,6 +286,18 @@ def _clock(system: System) -> Clock:
     if step is not None:
         return Clock(physics=step * 1e-3, embedded=embedded, central=central)
     whole = embedded or central
+    longest = min(LONGEST_STEP, _fastest_swing(system) / STEPS_PER_SWING)
     return Clock(
-        physics=whole / math.ceil(whole / LONGEST_STEP - 1e-9), embedded=embedded, central=central
+        physics=whole / math.ceil(whole / longest - 1e-9), embedded=embedded, central=central
     )
+
+
+def _fastest_swing(system: System) -> float:
+    """Shortest period of the bodies on their springs, motors locked, feet in the air, s."""
+    from scipy.linalg import eigh
+
+    robot = system.robot
+    springs = np.zeros(robot.nv)
+    springs[-robot.n :] = system.actuators.spring_stiffness
+    squares = eigh(np.diag(springs), robot.mass_matrix(system.posture), eigvals_only=True)
+    return 2.0 * math.pi / math.sqrt(squares[-1])
