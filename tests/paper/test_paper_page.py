@@ -53,6 +53,7 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
     figure = figure_4(system.robot, motion, system=system)
     walk = simulate_walk(system, WalkCase(steps=2))
     rows = walk_success({"default": WalkCase(steps=1)}, [paper_terrain()])
+    table = random_plant_table(30)
     delays = delay_map(motion, stiffnesses=[350.0], scales=[1.0, 6.0], terrains=1)
     everywhere = AblationTable(
         means=("everything", "no lead"), conditions=("K = 200", "α = 2", "no delay"), terrains=7,
@@ -69,8 +70,8 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
         beyond_section(rows, certificate),
     ]
     page = write_paper_page(
-        tmp_path, figure, figure_4_claims(figure), unsafe=unsafe_examples(draws=10),
-        table=random_plant_table(30), extra=extra, version="test",
+        tmp_path, figure, figure_4_claims(figure, table), unsafe=unsafe_examples(draws=10),
+        table=table, extra=extra, version="test",
     )  # fmt: skip
     text = page.read_text()
     links = Links()
