@@ -109,6 +109,8 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         print(f"{name:26} {value}")
     for reason in certificate.reasons:
         print(f"not certified because {reason}")
+    for bound, reason in certificate.left_open.items():
+        print(f"left open is a longer {bound}: {reason}")
     for assumption in certificate.assumptions:
         print(f"assumes that {assumption}")
 

@@ -101,17 +101,24 @@ def _instants(data: dict[str, Any], bounds: list[float], proven: list[int]) -> I
 
 
 def _verdict(data: dict[str, Any]) -> Check:
-    """Status, reasons and delays agree; a bound of 0 is where a condition fails."""
-    largest, delay = largest_delay(data), float(data["delay_s"])
-    enough, yes = delay <= largest, not data["reasons"]
+    """Status, reasons and delays agree; a bound of 0 is where a condition fails.
+
+    A bound over the whole motion that a solver left open below the design's delay is no answer, and
+    a law that loses its stability before its bound is not covered by it.
+    """
+    largest, delay, yes = largest_delay(data), float(data["delay_s"]), not data["reasons"]
+    shared = [data[name] for name in data["left_open"] if name != "max_delay_s"]
+    margin, certified = data["local_margin_s"], data["criterion"] == "certified"
     covered = data["criterion"] == "published" or data["feedback"] != "joint"
+    undercut = certified and data["stable"] and margin is not None and margin < largest
+    enough = delay <= largest and all(bound is None or delay <= bound for bound in shared)
     return Check(
         name="verdict",
         ok=data["status"] == ("certified" if yes else "not_certified")
         and data["criterion"] in ("certified", "published")
         and data["feedback"] in _FEEDBACKS
         and delay >= 0.0
-        and (yes == enough or (largest == 0.0 and not yes))
+        and (yes == (enough and not undercut) or (largest == 0.0 and not yes))
         and (covered or largest == 0.0),
         detail=f"{data['status']} by the {data['criterion']} criterion at {delay} s",
     )
