@@ -99,9 +99,8 @@ def certify(
         ),
         **_at_worst(system, motion, bounds, local),
         **_shared(bounds, common, moving),
-        **_design(system),
+        **design_entries(system),
         instants=len(motion),
-        levels=[int(row) for row in stack.levels],
         published_max_delay_s=float((bounds if printed else published).delay.min()),
         assumptions=_assumptions(system, kind, motion, local),
         time_s=motion.time.tolist(),
@@ -115,9 +114,15 @@ def certify(
     )
 
 
-def _design(system: System) -> dict[str, Any]:
-    """What the question was about."""
+def design_entries(system: System) -> dict[str, Any]:
+    """Return the entries of a certificate that come straight from the design.
+
+    Args:
+        system: the design.
+    """
     return {
+        "delay_s": system.delays.d_1,
+        "levels": system.hierarchy.levels(system.robot),
         "feedback": system.feedback.value,
         "gravity": system.gravity.value,
         "stiffness_form": system.hierarchy.form.value,
@@ -171,7 +176,6 @@ def _answer(
         "criterion": kind,
         "max_delay_s": max_delay_s,
         "max_delay_upper_s": float(bounds.upper[worst]),
-        "delay_s": delay_s,
         "asymmetry": float(np.max(crooked)),
         "contraction": float(stack.contraction.max()),
         "reasons": tuple(reasons),

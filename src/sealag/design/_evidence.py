@@ -5,7 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sealag.design._criteria import ASYMMETRY_TOLERANCE, PROOF_SHARE, Bounds
+from sealag.design._criteria import (
+    ASYMMETRY_TOLERANCE,
+    PROOF_SHARE,
+    Bounds,
+    printed_form,
+    task_stiffness,
+)
 from sealag.design._system import System
 from sealag.errors import SolverError
 from sealag.margin import delay_margin
@@ -22,7 +28,7 @@ from sealag.passivity import (
 )
 from sealag.robot import Motion
 from sealag.typing import Array
-from sealag.whole_body import Feedback, Linearisation, StiffnessForm, WholeBodyStack
+from sealag.whole_body import Feedback, Linearisation, WholeBodyStack
 
 COUPLING_TOLERANCE = 1e-6
 """Share of F from which an answer to passive motions of the base counts."""
@@ -288,15 +294,10 @@ def _proof(
     solver: Solver | None,
 ) -> Proof:
     D, d, F = system.actuators.motor_damping, float(bounds.delay[instant]), bounds.F[instant]
-    published = kind is Criterion.PUBLISHED
-    force = system.hierarchy.form is StiffnessForm.FORCE
-    S = stack.stiffness[instant]
-    if published:
-        S = stack.K_x if force else stack.Lambda[instant] @ stack.K_x
-        form = StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED
+    if kind is Criterion.PUBLISHED:
         levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
         tasks = [(J[instant], Lambda[instant], K_x) for J, Lambda, K_x in levels]
-        found = task_multipliers(tasks, D, delay=d, form=form, solver=solver)
+        found = task_multipliers(tasks, D, delay=d, form=printed_form(system), solver=solver)
         W = [(one.W + one.W.T) / 2.0 for one in found]
     else:
         W = [joint_multiplier(F, D, d)]
@@ -304,7 +305,7 @@ def _proof(
         instant=instant,
         delay_s=d,
         J_star=stack.J_star[instant].tolist(),
-        stiffness=S.tolist(),
+        stiffness=task_stiffness(stack, system, kind)[instant].tolist(),
         F_gravity=stack.F_gravity[instant].tolist(),
         F=F.tolist(),
         W=[block.tolist() for block in W],
