@@ -233,8 +233,12 @@ def _assumptions(
         "the embedded motor damping D_θ acts without delay",
         f"d_1 is at most {system.delays.d_1 * 1e3:.3f} ms; it may vary below that; where no "
         "embedded period is given, packets are sent and taken at once",
+        "the ways up and down count by their sum d_1 alone, since a stiffness is all that is fed "
+        "back; d_2 delays the feedforward and moves no root",
         "contacts neither slip nor lift off",
     ]
+    if system.delays.delayed_torque_feedback:
+        said.append("the embedded torque feedback acts without delay, though the design delays it")
     if system.gravity is GravityCompensation.PLANNED:
         said.append("gravity compensation comes from the plan and has no feedback gradient")
     if system.feedback is Feedback.STATIC_JOINT_TANK:
