@@ -111,15 +111,19 @@ def random_plant_table(count: int = 1000, *, seed: int = 0) -> RandomPlantTable:
     all_ = [compare_plant(index) for index in range(seed, seed + count)]
     known = [one for one in all_ if one.margin_s is not None]
     longer = [one for one in known if one.published_is_longer]
-    spoken = [(one, one.certified_s) for one in known if one.certified_s is not None]
-    ratios = [one.margin_s / bound for one, bound in spoken if np.isfinite(one.margin_s)]
+    spoken = [
+        (one.margin_s, one.certified_s)
+        for one in all_
+        if one.margin_s is not None and one.certified_s is not None
+    ]
+    ratios = [margin / bound for margin, bound in spoken if np.isfinite(margin)]
     return RandomPlantTable(
         plants=count,
         undecided=count - len(known),
         published_longer=len(longer),
         published_without_delay=sum(one.margin_s == 0.0 for one in longer),
         certified_spoke=len(spoken),
-        certified_longer=sum(one.certified_is_longer for one, _ in spoken),
+        certified_longer=sum(one.certified_is_longer for one in known),
         smallest_ratio=float(np.min(ratios)),
         median_ratio=float(np.median(ratios)),
     )
