@@ -1,12 +1,16 @@
 """The local margin of a certificate is checked from its frozen loop, by another method."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from helpers.certificates import failures, made
+import sealag
+from helpers.certificates import failures, made, plain
 from sealag.margin import delay_margin, random_sea_plant, rightmost_roots
+from sealag.passivity import verify
 from sealag.passivity._local import _added, _roots
 
 
@@ -122,3 +126,16 @@ def test_a_slack_crossing_is_not_hidden_by_leaving_it_out():
 def test_files_stay_small():
     assert len(json.dumps(made("baxter"))) < 60_000
     assert len(json.dumps(made("moving"))) < 120_000
+
+
+def test_a_loop_that_gains_stability_before_its_first_crossing_is_no_contradiction(tmp_path):
+    """Without contacts ANYmal's base turns with its legs: two roots move left on the way."""
+    text = Path("examples/anymal.toml").read_text()
+    project = tmp_path / "floating.toml"
+    project.write_text(re.sub(r'\[\[contacts\]\]\nframe = "\w+"\n', "", text))
+    certificate = sealag.certify(sealag.load(project))
+    data = plain(certificate)
+    assert data["unstable_modes"] == 2
+    count = [c for c in verify(data).checks if c.name == "no root crosses before"]
+    assert count[0].ok and "-2" in count[0].detail
+    assert failures(data) == []

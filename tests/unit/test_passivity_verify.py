@@ -277,3 +277,12 @@ def test_infinite_bounds_are_certified_without_numbers(criterion):
     assert data["max_delay_s"] is None
     assert data["status"] == "certified"
     assert failures(data) == []
+
+
+def test_a_bound_without_end_needs_a_law_that_feeds_nothing_back():
+    data = made("baxter")
+    data.update(
+        bounds_s=[None] * len(data["bounds_s"]), max_delay_s=None, max_delay_upper_s=None,
+        proofs=[], common_multiplier_delay_s=None, time_varying_delay_s=None, conservatism=None,
+    )  # fmt: skip
+    assert "bound without end" in failures(data)

@@ -64,6 +64,7 @@ def claim_checks(data: dict[str, Any], number: Reader) -> Iterator[Check]:
     yield _verdict(data)
     yield _published(data)
     yield _conservatism(data)
+    yield _unbounded(data)
     worst = [proof for proof in data["proofs"] if proof["instant"] == data["worst"]["instant"]]
     yield Check(
         name="proof of the worst instant",
@@ -161,6 +162,17 @@ def _conservatism(data: dict[str, Any]) -> Check:
         name="conservatism",
         ok=ratio == expected and not (passive and ratio is not None and ratio < 1.0),
         detail=f"local margin over bound is {ratio}",
+    )
+
+
+def _unbounded(data: dict[str, Any]) -> Check:
+    """A bound without end is claimed only of a law that feeds nothing back."""
+    loop, endless = data["local_loop"], math.isinf(largest_delay(data))
+    silent = loop is not None and not np.array(loop["L"], dtype=float).any()
+    return Check(
+        name="bound without end",
+        ok=not endless or silent,
+        detail="none is claimed" if not endless else "the frozen loop has no delayed part",
     )
 
 

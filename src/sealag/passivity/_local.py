@@ -153,13 +153,17 @@ def _on_axis(P: Array, R: Array, L: Array, *, delay: float, omega: float) -> Che
 
 
 def _count(P: Array, R: Array, L: Array, roots: Array, *, delay: float, omega: float) -> Check:
-    """Roots that delays below the first crossing add to the right half plane."""
+    """Roots that delays below the first crossing add to the right half plane: none; a loop that is
+    unstable without delay may lose some there."""
     added = [_added(P, R, L, roots, delay=share * delay, omega=omega) for share in _SHARES]
     at = ", ".join(f"{share * delay:.6g}" for share in _SHARES)
     words = ", ".join("?" if number is None else f"{number:+d}" for number in added)
     return Check(
         name="no root crosses before",
-        ok=not any(number is None or number for number in added),
+        ok=all(
+            after is not None and before is not None and after <= before
+            for before, after in zip([0, *added], added)
+        ),
         detail=f"{words} roots right of the axis with delays of {at} s, argument principle in "
         "floating point",
     )
