@@ -1,11 +1,9 @@
 """Simulated delay equations decay just below the margin and grow just above it."""
 
+import jitcdde
 import numpy as np
-import pytest
 
 from sealag.margin import delay_margin, random_sea_plant
-
-jitcdde = pytest.importorskip("jitcdde")
 
 
 def growth(A_0: np.ndarray, A_1: np.ndarray, *, delay: float, omega: float, mode) -> float:

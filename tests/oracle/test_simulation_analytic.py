@@ -1,7 +1,5 @@
 """The simulator against closed forms and a delay differential equation solver."""
 
-import shutil
-
 import jitcdde
 import numpy as np
 import pytest
@@ -62,8 +60,6 @@ def test_locked_joint(tmp_path, damping):
 
 def test_delayed_feedback_against_jitcdde(tmp_path):
     """One joint, motor-angle feedback 60 ms late, close to its margin of 77.3 ms."""
-    if shutil.which("cc") is None:
-        pytest.skip("JiTCDDE needs a C compiler")
     import symengine
 
     K, B_s, D, K_q, d, T = 350.0, 0.09, 10.0, 100.0, 0.06, 1.0
@@ -102,28 +98,29 @@ def test_delayed_feedback_against_jitcdde(tmp_path):
     assert np.abs(exact[:, 0]).max() < 1.0
 
 
-def _stiff_pendulum(folder, minutes, step):
-    """A double pendulum whose springs are so stiff and rotors so light that it swings freely."""
+def _pendulum(folder, step):
+    """A minute of a double pendulum with rotors so light that their springs carry next to nothing:
+    it swings as if it had none."""
     robot = chain(folder, count=2)
-    springs = _springs(robot, spring_stiffness=30.0, rotor_inertia=0.05)
+    springs = _springs(robot, spring_stiffness=30.0, rotor_inertia=1e-4)
     return closed_loop(
         robot,
         springs,
         ConstantTorque([0.0, 0.0]),
         q=np.array([1.0, 0.5]),
         theta=np.array([1.0, 0.5]),
-        duration=60.0 * minutes,
+        duration=60.0,
         clock=Clock(physics=step, central=step),
         scene=Scene(),
-        log_period=50 * step,
+        log_period=20 * step,
     )
 
 
-def test_passive_double_pendulum_keeps_its_energy(tmp_path):
-    run = _stiff_pendulum(tmp_path, 0.25, 1e-3)
+def test_passive_double_pendulum_keeps_its_energy_for_a_minute(tmp_path):
+    run = _pendulum(tmp_path, 1e-3)
     assert run.outcome is Outcome.COMPLETED
-    drift = abs(run.audit.residual[-1]) / 0.25
-    swing = np.ptp(run.audit.stores["kinetic"])
-    assert drift < 1e-8 * swing
-    coarse = _stiff_pendulum(tmp_path, 0.25, 4e-3)
-    assert abs(coarse.audit.residual[-1]) > 30 * abs(run.audit.residual[-1])
+    lost, swing = np.abs(run.audit.residual).max(), np.ptp(run.audit.stores["kinetic"])
+    assert lost < 5e-8 * swing
+    assert np.abs(run.tau_sea).max() < 0.01 * swing  # of the same size as its weight's torque, Nm
+    coarse = _pendulum(tmp_path, 4e-3)
+    assert np.abs(coarse.audit.residual).max() > 30 * lost

@@ -93,14 +93,36 @@ def test_walks_rough_ground_under_delay(hume):
 
 
 @pytest.mark.parametrize(
-    "options",
-    [WalkingOptions.published(), WalkingOptions(prediction="none"), WalkingOptions(lead=False)],
+    ("options", "outcome"),
+    [
+        (WalkingOptions.published(), Outcome.FELL),
+        (WalkingOptions(prediction="none"), Outcome.FELL),
+        (WalkingOptions(lead=False), Outcome.COMPLETED),
+    ],
 )
-def test_no_gait_without_the_means(hume, options):
-    """Negative control: the published law, and ours without prediction or lead, have no gait."""
+def test_no_gait_without_the_means(hume, options, outcome):
+    """Negative control: the published law and ours without prediction fall; without lead it stays
+    up, but its steps are none of the plan."""
     walk = simulate_walk(hume, WalkCase(terrain=rough_terrain(0), options=options, steps=8))
+    assert walk.run.outcome is outcome
     assert not walk.is_gait
-    assert walk.run.outcome in Outcome
+
+
+def test_too_short_a_walk_is_no_gait(hume):
+    """Two steps say nothing about a gait; three do."""
+    walk = simulate_walk(hume, WalkCase(terrain=FlatTerrain(), steps=3))
+    assert walk.is_gait
+    early = walk.apex_step < 2
+    cut = replace(
+        walk,
+        case=replace(walk.case, steps=2),
+        step_width=walk.step_width[:2],
+        apex_speed=walk.apex_speed[early],
+        apex_step=walk.apex_step[early],
+    )
+    assert cut.walked
+    assert np.isnan([cut.speed_deviation, cut.width_deviation]).all()
+    assert not cut.is_gait
 
 
 def test_gait_needs_the_angular_momentum(hume):

@@ -3,10 +3,13 @@
 import errno
 import json
 import os
+import resource
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
+from sealag.cli import main
 from sealag.errors import FileError, InputError
 from sealag.report import McapRecorder, read_recording
 from sealag.report import _mcap as mcap_module
@@ -108,3 +111,52 @@ def test_wrong_shapes_and_files_are_refused(tmp_path):
         read_recording(tmp_path / "no.mcap")
     with pytest.raises(FileError, match="cannot be read"):
         read_recording(tmp_path / "missing.mcap")
+
+
+@contextmanager
+def _no_file_longer_than(size):
+    """Neither the reserve nor the recording, as on a disk or quota with so little room."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def _simulate(path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", "examples/baxter.toml", "--duration", "0.15", "--out", str(path)])
+    return stop.value.code, *capsys.readouterr()
+
+
+def test_without_room_for_a_reserve_the_run_is_kept_as_far_as_it_fits(tmp_path, capsys):
+    path = tmp_path / "run.mcap"
+    with _no_file_longer_than(300_000):
+        answer = _simulate(path, capsys)
+    kept = "what was recorded until then is kept"
+    assert answer == (2, "", f"sealag: {path} is cut off: File too large; {kept}.\n")
+    recording = read_recording(path)
+    assert not recording.complete
+    assert len(recording.signals["/joint_states"].time) > 30
+    assert recording.metadata["outcome"] == "completed"
+    assert os.listdir(tmp_path) == ["run.mcap"]
+
+
+def test_a_recording_that_cannot_begin_leaves_nothing_behind(tmp_path, capsys):
+    path = tmp_path / "run.mcap"
+    with _no_file_longer_than(1_000):
+        answer = _simulate(path, capsys)
+    assert answer == (2, "", f"sealag: {path} cannot be written: File too large.\n")
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_recording_that_fits_needs_no_reserve(tmp_path):
+    """Negative control of both: little room, but less to write."""
+    path = tmp_path / "run.mcap"
+    with _no_file_longer_than(300_000):
+        time, _ = _write(path)
+    recording = read_recording(path)
+    assert recording.complete
+    assert len(recording.signals["/joint_states"].time) == len(time)
+    assert os.listdir(tmp_path) == ["run.mcap"]

@@ -8,7 +8,7 @@ from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD
 from sealag.actuation import actuators
 from sealag.delay import Constant, Link
-from sealag.errors import ContractionError, InputError, UnknownNameError
+from sealag.errors import ContractionError, InputError, SolverError, UnknownNameError
 from sealag.robot import Contact, ContactKind, load_robot
 from sealag.simulation import (
     Clock,
@@ -23,6 +23,7 @@ from sealag.simulation import (
     require_hold,
     touching_posture,
 )
+from sealag.simulation._plant import Plant
 
 FEET = ("left_foot", "right_foot")
 
@@ -203,6 +204,52 @@ class TestNamedEnds:
         assert run.outcome is Outcome.CONTROLLER_FAILED
         assert "no fixed point" in run.message
         assert run.time[-1] == pytest.approx(0.05)
+
+    def test_controller_whose_arithmetic_breaks_down(self, hume, springs):
+        class Singular(ConstantTorque):
+            def tick(self, t, measurement, out):
+                super().tick(t, measurement, out)
+                if t > 0.05:
+                    np.linalg.inv(np.zeros((2, 2)))
+
+        run = _run(hume, springs, _posture(hume), Singular(np.zeros(6)))
+        assert run.outcome is Outcome.CONTROLLER_FAILED
+        assert "controller cannot be evaluated: Singular matrix" in run.message
+        assert run.time[-1] == pytest.approx(0.05)
+
+    def test_controller_whose_arithmetic_breaks_down_before_the_run(self, hume, springs):
+        class Overflows(ConstantTorque):
+            def tick(self, t, measurement, out):
+                out[:] = 10.0**400
+
+        with pytest.raises(SolverError, match="controller cannot be evaluated"):
+            _run(hume, springs, _posture(hume), Overflows(np.zeros(6)))
+
+    @pytest.mark.parametrize("error", [np.linalg.LinAlgError("Singular matrix"), OverflowError()])
+    def test_plant_whose_arithmetic_breaks_down(self, hume, springs, monkeypatch, error):
+        step = Plant.step
+
+        def breaks(plant, *arguments):
+            if plant.time > 0.05:
+                raise error
+            step(plant, *arguments)
+
+        monkeypatch.setattr(Plant, "step", breaks)
+        run = _run(hume, springs, _posture(hume))
+        assert run.outcome is Outcome.DIVERGED
+        assert "no numbers after t = 0.05" in run.message
+        assert 0.04 < run.time[-1] < 0.06
+        assert np.isfinite(run.q).all()
+
+    def test_an_error_of_the_program_is_not_hidden(self, hume, springs):
+        """Negative control: what is no arithmetic stays an exception."""
+
+        class Wrong(ConstantTorque):
+            def tick(self, t, measurement, out):
+                out[:] = np.zeros(5)
+
+        with pytest.raises(ValueError, match="broadcast"):
+            _run(hume, springs, _posture(hume), Wrong(np.zeros(6)))
 
     def test_command_that_is_no_number(self, hume, springs):
         class Broken(ConstantTorque):

@@ -40,8 +40,6 @@ class WalkingController:
         period: Time between two ticks, s.
 
     Attributes:
-        touchdowns: Planned steps so far: (instant on the controller's clock, foot number, its
-            planned place (3,)).
         tau_task: Task torque of the last tick (n,), before feedforward of motor and spring, Nm.
 
     Raises:
@@ -83,7 +81,6 @@ class WalkingController:
         self._gains, self._embedded_gains = _gains(self.options, period)
         self._rates, self._smooth, self._first = np.zeros(robot.n), np.zeros(robot.n), True
         self.tau_task = np.zeros(robot.n)
-        self.touchdowns: list[tuple[float, int, Array]] = []
 
     def reset(self, t: float, measurement: Measurement) -> None:
         """Begin at the apex over the foot that is loaded, in the middle of its step.
@@ -114,7 +111,6 @@ class WalkingController:
         )
         self._estimator.reset(feet, self.step.stance)
         self._first = True
-        self.touchdowns.clear()
 
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
         """Compute the command tau_osc.
@@ -190,7 +186,6 @@ class WalkingController:
         late = step.phase(now) > _LATE_SWING * gait.step_time + 0.4 * gait.transfer_time
         touched = self.options.early_contact and late and contact[1 - step.stance] > 0.0
         if touched or step.phase(now) >= gait.step_time - 1e-9:
-            self.touchdowns.append((now, 1 - step.stance, step.target.copy()))
             step.change(now, np.stack([self._body.foot(0), self._body.foot(1)]))
             self.placement.restart()
 

@@ -121,15 +121,19 @@ class Walk:
 
     @property
     def speed_deviation(self) -> float:
-        """Largest relative deviation of the apex speeds from the plan after the second step."""
-        late = self.apex_speed[self.apex_step >= SETTLING]
-        return float(np.abs(late / self.case.gait.apex_speed - 1.0).max(initial=0.0))
+        """Largest relative deviation of the apex speeds from the plan after the second step.
+
+        NaN if there are no later ones.
+        """
+        return _deviation(self.apex_speed[self.apex_step >= SETTLING], self.case.gait.apex_speed)
 
     @property
     def width_deviation(self) -> float:
-        """Largest relative deviation of the step widths from the plan after the second step."""
-        late = self.step_width[SETTLING:]
-        return float(np.abs(late / self.case.gait.step_width - 1.0).max(initial=0.0))
+        """Largest relative deviation of the step widths from the plan after the second step.
+
+        NaN if there are no later ones.
+        """
+        return _deviation(self.step_width[SETTLING:], self.case.gait.step_width)
 
     @property
     def is_gait(self) -> bool:
@@ -262,6 +266,10 @@ def measure_walk(robot: Robot, run: Run, case: WalkCase, *, task: Array) -> Walk
         com=com,
         task=task,
     )
+
+
+def _deviation(values: Array, planned: float) -> float:
+    return float(np.abs(values / planned - 1.0).max()) if len(values) else float("nan")
 
 
 def _forward_speed(at: Workspace, q: Array, v: Array) -> float:

@@ -108,27 +108,35 @@ class RecordingFile:
 
 
 class _ReservedFile:
-    """A file that keeps room beside it, to be closed properly when the disk is full."""
+    """A file that keeps room beside it, where there is any, to be closed properly on a full disk.
+
+    What cannot be written as a whole leaves nothing behind, and is kept as the failure.
+    """
 
     def __init__(self, path: Path) -> None:
         self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
         self._reserve = path.with_name(path.name + ".reserve")
         self.full = False
-        with open(self._reserve, "wb") as reserve:
-            os.posix_fallocate(reserve.fileno(), 0, RESERVE_BYTES)
+        self.failure: OSError | None = None
+        try:
+            with open(self._reserve, "wb") as reserve:
+                os.posix_fallocate(reserve.fileno(), 0, RESERVE_BYTES)
+        except OSError:
+            self._reserve.unlink(missing_ok=True)
 
     def write(self, data: bytes) -> int:
         start = self._file.tell()
         try:
             self._write_all(data)
         except OSError as error:
+            self._file.seek(start)
+            self._file.truncate()
             if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or self.full:
+                self.failure = error
                 raise
             self.full = True
             self._reserve.unlink(missing_ok=True)
-            self._file.seek(start)
-            self._file.truncate()
-            self._write_all(data)
+            self.write(data)
         return len(data)
 
     def _write_all(self, data: bytes) -> None:
@@ -158,7 +166,8 @@ class _Channel:
 class McapRecorder:
     """Writes a recording block by block; closing it, even after Ctrl-C, leaves a readable file.
 
-    Use it as a context manager. Each block of rows becomes one message a row.
+    Use it as a context manager. Each block of rows becomes one message a row. Where there is no
+    room for the reserve, a full disk cuts the file off behind its last whole chunk.
 
     Attributes:
         path: where the recording goes; it is written beside it as `<name>.partial` and renamed
@@ -182,16 +191,25 @@ class McapRecorder:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file = _ReservedFile(self._partial)
+            self._writer = Writer(
+                self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD
+            )
+            self._begin()
         except OSError as error:
+            if self._file is not None:
+                self._file.close()
+                self._partial.unlink()
             raise FileError(f"{self.path} cannot be written: {error.strerror or error}.") from error
-        self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        return self
+
+    def _begin(self) -> None:
+        """Write what the file says about itself."""
         self._writer.start(profile="", library="sealag")
         for name, content in self.attachments.items():
             self._writer.add_attachment(
                 create_time=0, log_time=0, name=name, media_type="text/plain", data=content
             )
         self._writer.add_metadata("run", dict(self.metadata))
-        return self
 
     def __exit__(
         self,
@@ -199,11 +217,20 @@ class McapRecorder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        failure: OSError | None = self._file.failure
         try:
-            self._writer.finish()
+            if failure is None:
+                self._writer.finish()
+        except OSError as late:
+            failure = late
         finally:
             self._file.close()
             os.replace(self._partial, self.path)
+        if failure is not None:
+            raise FileError(
+                f"{self.path} is cut off: {failure.strerror or failure}; "
+                "what was recorded until then is kept."
+            ) from failure
 
     @property
     def _partial(self) -> Path:

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from sealag.actuation import Actuators
 from sealag.delay import DelayLine
-from sealag.errors import InputError, SealagError
+from sealag.errors import InputError, SealagError, SolverError
 from sealag.robot import Robot
 from sealag.simulation._audit import Stated, audit
 from sealag.simulation._ledger import JOINT_FLOWS, ledger_sizes
@@ -29,6 +30,7 @@ _AT_REST = 1e-12  # rad: how far the first motor angles may be from rest
 _ROUNDS = 50
 _SCALARS = ("time", "measurement_age", "command_age", "storage", "tank")
 _LONGEST = 100.0  # rad: a spring deflection beyond any physical range
+_BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError)  # numbers that have no answer
 
 
 def closed_loop(
@@ -166,8 +168,8 @@ class _Loop:
         def answer(angles: Array) -> Array:
             self.plant.sense(0.0, truth.data)
             truth.theta[:], truth.tau_sea[:] = angles, stiffness * (angles - q[-n:])
-            self.controller.reset(0.0, truth)
-            self.controller.tick(0.0, truth, first)
+            self._ask(self.controller.reset, 0.0, truth)
+            self._ask(self.controller.tick, 0.0, truth, first)
             return q[-n:] + first / stiffness
 
         if theta is None:
@@ -176,7 +178,7 @@ class _Loop:
         else:
             answer(np.asarray(theta, dtype=float))
         self.plant.sense(0.0, truth.data)
-        self.controller.reset(0.0, truth)
+        self._ask(self.controller.reset, 0.0, truth)
         self._up.fill(truth.data)
         self.command[1:] = first
         self._down.fill(self.command)
@@ -193,7 +195,7 @@ class _Loop:
         first = guess
         for _ in range(_ROUNDS):
             guess, last = answer(guess), guess
-            if not np.isfinite(guess).all():
+            if not np.abs(guess - first).max(initial=0.0) < _LONGEST:
                 break
             if np.abs(guess - last).max(initial=0.0) < _AT_REST:
                 return guess
@@ -247,11 +249,24 @@ class _Loop:
         except SealagError as error:
             outcome = Outcome.CONTROLLER_FAILED
             message = f"at t = {self.plant.time:.4f} s: {error}"
+        except _BREAKDOWN as error:
+            outcome = Outcome.DIVERGED
+            message = f"the motion has no numbers after t = {self.plant.time:.4f} s: {error}"
         except KeyboardInterrupt:
             outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
         if not log.filled:
             self._record(log)
         return self._result(log, outcome, message)
+
+    @staticmethod
+    def _ask(question: Callable[..., Any], *arguments: Any) -> Any:
+        """Ask the controller; where its arithmetic breaks down, it has failed."""
+        try:
+            return question(*arguments)
+        except SealagError:
+            raise
+        except _BREAKDOWN as error:
+            raise SolverError(f"the controller cannot be evaluated: {error}") from error
 
     def _control(self, i: int) -> None:
         """Exchange what is due at physics step i."""
@@ -263,7 +278,7 @@ class _Loop:
             self._up.send(t, self.truth.data)
         if i % self._central_steps == 0:
             self._up.receive(t, self.received.data)
-            self.controller.tick(t, self.received, self.command[1:])
+            self._ask(self.controller.tick, t, self.received, self.command[1:])
             self.command[0] = t
             if not math.isfinite(sum(self.command.tolist())):
                 raise PlantStop(
@@ -322,7 +337,7 @@ class _Loop:
         plant, t, storage = self.plant, self.plant.time, 0.0
         if self._storing is not None:
             self.plant.sense(t, self.truth.data)
-            storage = self._storing.storage(t, self.truth, self._present)
+            storage = self._ask(self._storing.storage, t, self.truth, self._present)
         received, sent, acting = self.received.data[0], self.command[0], self.acting[0]
         tank = 0.0 if self._tank is None else self._tank.tank_energy
         log.row(

@@ -11,13 +11,15 @@ class Outcome(StrEnum):
     FELL = "fell"
     """The base tilted or sank beyond the posture limits."""
     DIVERGED = "diverged"
-    """A velocity or spring deflection left any physical range, or a number was not finite."""
+    """A velocity or spring deflection left any physical range, or a number was not finite or could
+    not be computed."""
     CONTACT_UNSOLVABLE = "contact_unsolvable"
     """No set of contact forces satisfies the contact conditions in this state."""
     CHATTERED = "chattered"
     """Contacts opened and closed too often within one step."""
     CONTROLLER_FAILED = "controller_failed"
-    """The controller raised one of sealag's errors or commanded a number that is not finite."""
+    """The controller raised one of sealag's errors, its arithmetic broke down, or it commanded a
+    number that is not finite."""
     INTERRUPTED = "interrupted"
     """The user stopped the run; what was simulated until then is complete."""
 

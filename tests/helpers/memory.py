@@ -1,0 +1,81 @@
+"""Resident memory that many ticks of a controller leave behind, in a process of their own.
+
+`python -m helpers.memory anymal` ticks `sealag.Controller`, `… hume` the walking controller through
+step after step; `… leaking` loses 64 bytes a tick besides on the heap of C, which no Python tool
+sees. It prints the growth over the ticks after the first ones, carried on to an hour, in bytes.
+"""
+
+import ctypes
+import resource
+import sys
+
+import numpy as np
+
+from sealag.design import load
+from sealag.locomotion import FlatTerrain, begin_walk
+from sealag.whole_body import Controller, ControllerOptions, Measurement
+
+WARM, TICKS = 1_000, 10_000
+HOUR = 3_600_000
+"""Ticks of a 1 kHz controller."""
+
+
+def standing():
+    """Return ANYmal's controller and what it measures."""
+    system = load("examples/anymal.toml")
+    options = ControllerOptions(feedback="static_joint_tank", gravity=system.gravity)
+    controller = Controller(
+        system.robot, system.hierarchy, system.actuators, contacts=system.contacts,
+        posture=system.posture, options=options,
+    )  # fmt: skip
+    return controller, _measured(system.robot, system.posture, np.zeros(system.robot.nv), 4)
+
+
+def walking():
+    """Return Hume's walking controller and the state at the apex, which it sees for ever."""
+    system = load("bundled:hume")
+    controller, q, v, _ = begin_walk(system.robot, system.actuators, FlatTerrain())
+    measured = _measured(system.robot, q, v, 2)
+    measured.contact[1] = 1.0
+    return controller, measured
+
+
+def _measured(robot, q, v, contacts):
+    measured = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n, contacts=contacts)
+    measured.q[:], measured.v[:] = q, v
+    measured.theta[:] = measured.q_joint
+    return measured
+
+
+def growth(controller, measured, *, lost=0):
+    """Return by how many bytes resident memory grows in the ticks after the first ones.
+
+    Args:
+        controller: what is ticked at 1 kHz.
+        measured: what it sees, but for motor angles that sway.
+        lost: bytes that are lost at each tick.
+    """
+    rest, out = measured.theta.copy(), np.zeros(measured.theta.size)
+    malloc = ctypes.CDLL(None).malloc
+    controller.reset(0.0, measured)
+    before = 0
+    for k in range(WARM + TICKS):
+        if k == WARM:
+            before = _resident()
+        measured.data[0] = 1e-3 * k
+        measured.theta[:] = rest + 1e-3 * np.sin(0.01 * k)
+        controller.tick(1e-3 * k, measured, out)
+        if lost:
+            malloc(lost)
+    return _resident() - before
+
+
+def _resident():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize()
+
+
+if __name__ == "__main__":
+    controller, measured = standing() if sys.argv[1] == "anymal" else walking()
+    found = growth(controller, measured, lost=64 if sys.argv[1] == "leaking" else 0)
+    print(found * HOUR // TICKS)
