@@ -1,6 +1,7 @@
 """What a person looks at: plots, self-contained HTML pages and MCAP recordings."""
 
-from sealag.report._mcap import McapRecorder, RecordingFile, Signal, read_recording
+from sealag.report._mcap import McapRecorder
+from sealag.report._mcap_reader import RecordingFile, Signal, read_recording
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page
 from sealag.report._paper_page import write_paper_page
 from sealag.report._plots import (
