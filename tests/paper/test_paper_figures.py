@@ -8,19 +8,32 @@ import pytest
 from sealag.design import load
 from sealag.locomotion import FlatTerrain, paper_terrain, plan_walk, walk_motion
 from sealag.paper import (
+    PUBLISHED_LAW,
+    TorqueTrace,
     Verdict,
     WalkCase,
+    ablation_cases,
     figure_4,
     figure_4_claims,
+    figure_5_claims,
     measured_lag,
     random_plant_table,
+    robustness_cases,
+    rough_terrains,
     simulate_walk,
     simulated_motion,
     unsafe_examples,
+    walk_claim,
+    walk_success,
 )
 from sealag.whole_body import Feedback, StiffnessForm
 
 HUME = load("bundled:hume")
+
+
+@pytest.fixture(scope="module")
+def table():
+    return random_plant_table(60)
 
 
 @pytest.fixture(scope="module")
@@ -29,8 +42,8 @@ def figure():
     return figure_4(HUME.robot, motion, system=HUME)
 
 
-def test_claims_of_figure_4(figure):
-    verdicts = {claim.key: claim.verdict for claim in figure_4_claims(figure)}
+def test_claims_of_figure_4(figure, table):
+    verdicts = {claim.key: claim.verdict for claim in figure_4_claims(figure, table)}
     assert verdicts == {
         "alpha": Verdict.CONFIRMED,
         "abduction": Verdict.CONFIRMED,
@@ -39,13 +52,62 @@ def test_claims_of_figure_4(figure):
     }
 
 
-def test_a_figure_that_falls_contradicts_the_claims(figure):
+def test_a_figure_that_falls_contradicts_the_claims(figure, table):
     wrong = replace(
         figure, delay_s=figure.delay_s[::-1, ::-1], stiffness_delay_s=figure.stiffness_delay_s[::-1]
     )
-    verdicts = {claim.key: claim.verdict for claim in figure_4_claims(wrong)}
-    for key in ("alpha", "abduction", "stiffness"):
+    wrong_table = replace(table, certified_longer=1)
+    verdicts = {claim.key: claim.verdict for claim in figure_4_claims(wrong, wrong_table)}
+    for key in ("alpha", "abduction", "sufficient"):
         assert verdicts[key] is Verdict.CONTRADICTED
+    assert verdicts["stiffness"] is Verdict.CONTRADICTED
+
+
+def test_one_step_the_other_way_qualifies_a_claim(figure, table):
+    partly = replace(figure, stiffness_delay_s=figure.stiffness_delay_s * [1.0, 1.0, 1.01])
+    sound = replace(table, published_longer=0)
+    verdicts = {claim.key: claim.verdict for claim in figure_4_claims(partly, sound)}
+    assert verdicts["stiffness"] is Verdict.QUALIFIED  # falls, but not in inverse proportion
+    assert verdicts["sufficient"] is Verdict.CONFIRMED
+
+
+def _trace(*, beta, alpha, deviation, raw, lag, walk):
+    return TorqueTrace(
+        beta=beta, damping_scale=alpha, stiffness=350.0, walk=walk, command=np.zeros((0, 6)),
+        achieved=np.zeros((0, 6)), deviation=np.full(6, deviation), raw_deviation=np.full(6, raw),
+        command_lag=lag, torque_lag=lag, channel=0.0158,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("sign", "lag", "verdict"),
+    [(1.0, 0.017, Verdict.CONFIRMED), (-1.0, 0.030, Verdict.CONTRADICTED)],
+)
+def test_claims_of_figure_5_follow_the_torques(sign, lag, verdict):
+    walk = simulate_walk(HUME, WalkCase(steps=1))
+    traces = [
+        _trace(beta=beta, alpha=alpha, deviation=5 + sign * (beta + alpha), lag=lag,
+               raw=50 + sign * 30 * alpha, walk=walk)
+        for alpha in (0.3, 1.0) for beta in (0.1, 1.0)
+    ]  # fmt: skip
+    verdicts = {claim.key: claim.verdict for claim in figure_5_claims(traces)}
+    assert verdicts == {"beta": verdict, "damping deviation": verdict, "lag": verdict}
+    other = 0.023 if sign > 0.0 else 0.017
+    deviation = traces[0].deviation
+    mixed = [*traces[:-1], replace(traces[-1], deviation=deviation, torque_lag=other)]
+    verdicts = {claim.key: claim.verdict for claim in figure_5_claims(mixed)}
+    assert set(verdicts.values()) == {Verdict.QUALIFIED}
+
+
+def test_the_default_project_walks_twenty_rough_grounds_with_noise_and_wrong_models():
+    cases = {k: v for k, v in robustness_cases(steps=7).items() if k.startswith("noise and")}
+    cases[PUBLISHED_LAW] = ablation_cases()[PUBLISHED_LAW]
+    robust, published = walk_success(cases, rough_terrains(20))
+    assert robust.gaits >= 19, robust.causes
+    claim = walk_claim([robust], published)
+    assert claim.verdict is Verdict.QUALIFIED  # it walks, but not with the law as printed
+    assert published.walked == 0
+    assert walk_claim([published], published).verdict is Verdict.CONTRADICTED
 
 
 def test_figure_4_is_proportional_to_alpha_and_the_swing_leg_hardly_counts(figure):

@@ -9,6 +9,7 @@ from sealag.design import certify, load, save_motion
 from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.paper import (
     HELD_OUT,
+    PUBLISHED_LAW,
     ablation_cases,
     ablation_table,
     delay_map,
@@ -25,6 +26,7 @@ from sealag.paper import (
     simulated_motion,
     unsafe_examples,
     walk_beyond,
+    walk_claim,
     walk_success,
 )
 from sealag.report import (
@@ -65,18 +67,30 @@ def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
     certificate = certify(system, motion, time_varying=True)
     simulated = figure_4(system.robot, simulated_motion(walk.run), system=system)
     traces = figure_5(jobs=2)
-    claims = (*figure_4_claims(figure), *figure_5_claims(traces))
+    claims = (
+        *figure_4_claims(figure, table),
+        *figure_5_claims(traces),
+        walk_claim(robust, next(row for row in ablations if row.name == PUBLISHED_LAW)),
+    )
     progress("[7/7] writing the page")
     extra = [
-        walk_section(system.robot, walk, robust, held_out),
-        means_section(ablations, everywhere, gait),
+        walk_section(system, walk, robust, held_out),
+        means_section(system, walk, ablations, everywhere, gait),
         energy_section(walk, certificate),
         limits_section(figure, simulated, gains, delays),
         figure_5_section(traces, system.robot.joints),
         beyond_section(beyond, certificate),
     ]
     page = write_paper_page(
-        out, figure, claims, unsafe=unsafe, table=table, extra=extra, version=VERSION
+        out,
+        figure,
+        claims,
+        unsafe=unsafe,
+        table=table,
+        simulated=simulated,
+        traces=traces,
+        extra=extra,
+        version=VERSION,
     )
     return {
         "page": str(page),

@@ -1,6 +1,7 @@
 """The paper's figures and statements, computed here and checked one by one."""
 
 from sealag.paper._ablation import (
+    PUBLISHED_LAW,
     AblationTable,
     ablation_cases,
     ablation_table,
@@ -25,11 +26,13 @@ from sealag.paper._walk_table import (
     gain_cases,
     robustness_cases,
     rough_terrains,
+    walk_claim,
     walk_success,
 )
 
 __all__ = [
     "HELD_OUT",
+    "PUBLISHED_LAW",
     "AblationTable",
     "CertifiedVariant",
     "Claim",
@@ -63,5 +66,6 @@ __all__ = [
     "simulated_motion",
     "unsafe_examples",
     "walk_beyond",
+    "walk_claim",
     "walk_success",
 ]

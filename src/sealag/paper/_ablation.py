@@ -12,6 +12,8 @@ from sealag.paper._walk import WalkCase
 from sealag.paper._walk_table import walk_success
 from sealag.typing import IntArray
 
+PUBLISHED_LAW = "published law"
+
 LEFT_OUT: Mapping[str, Mapping[str, Any]] = {
     "everything": {},
     "no preview": {"preview": False},
@@ -62,11 +64,11 @@ def ablation_cases(*, steps: int = 7) -> dict[str, WalkCase]:
     gait = replace(whole.gait, transfer_time=1e-3)
     cases["no weight transfer"] = replace(whole, gait=gait)
     law = WalkingOptions.published()
-    cases["published law"] = replace(whole, options=law)
-    cases["published law, link-side feedback"] = replace(
+    cases[PUBLISHED_LAW] = replace(whole, options=law)
+    cases[f"{PUBLISHED_LAW}, link-side feedback"] = replace(
         whole, options=WalkingOptions.published(feedback="joint")
     )
-    cases["published law, no delay"] = replace(whole, options=law, delay_scale=0.0)
+    cases[f"{PUBLISHED_LAW}, no delay"] = replace(whole, options=law, delay_scale=0.0)
     return cases
 
 
@@ -132,7 +134,7 @@ def ablation_table(
         "delays × 2": {"delay_scale": 2.0},
     }
     means = ablation_cases(steps=steps)
-    means = {name: case for name, case in means.items() if not name.startswith("published law,")}
+    means = {name: case for name, case in means.items() if not name.startswith(f"{PUBLISHED_LAW},")}
     cases = {}
     for name, case in means.items():
         for condition, change in conditions.items():

@@ -1,5 +1,6 @@
 """What the paper says, beside what is computed here."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -10,6 +11,19 @@ class Verdict(StrEnum):
     CONFIRMED = "confirmed"
     QUALIFIED = "qualified"
     CONTRADICTED = "contradicted"
+
+    @classmethod
+    def of(cls, cases: Iterable[object]) -> "Verdict":
+        """Judge a statement by the cases in which it was looked at.
+
+        Args:
+            cases: for each whether the statement held; confirmed if all did, contradicted if none
+                did, else qualified, as it is without any case.
+        """
+        held = [bool(case) for case in cases]
+        if not held or (any(held) and not all(held)):
+            return cls.QUALIFIED
+        return cls.CONFIRMED if held[0] else cls.CONTRADICTED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
