@@ -78,15 +78,28 @@ def _ms(seconds: float | None) -> str:
     return f"{seconds * 1e3:.3f} ms" if np.isfinite(seconds) else "any"
 
 
+def _stability(certificate: Certificate) -> str:
+    """What is known of stability at the worst instant, which a passive loop need not have."""
+    if certificate.unstable_modes:
+        count = certificate.unstable_modes
+        return (
+            f"no: {count} root{'s' * (count > 1)} unstable without delay (passive is not stable)"
+        )
+    if certificate.stable is None:
+        known = certificate.local_loop is not None
+        return "without delay yes: no unstable root" if known else "not known"
+    return "yes" if certificate.stable else "no: the potential has no minimum"
+
+
 def _show_certificate(certificate: Certificate, path: Path) -> None:
     worst = certificate.worst
     shares = sorted(worst.direction.items(), key=lambda item: -item[1])
     limiting = ", ".join(f"{name} {share:.0%}" for name, share in shares[:3] if share >= 0.01)
     crossing = certificate.first_crossing_s
-    stable = {True: "yes", False: "no", None: "has no answer here"}[certificate.stable]
     verdict = certificate.status.value.replace("_", " ")
     rows = [
         ("verdict", f"{verdict} ({certificate.criterion} criterion)"),
+        ("stable", _stability(certificate)),
         ("largest delay", _ms(certificate.max_delay_s)),
         ("delay of the design", _ms(certificate.delay_s)),
         (
@@ -96,15 +109,13 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         ("gives in first", limiting),
         ("exact local margin there", _ms(certificate.local_margin_s)),
         ("first crossing there", _ms(crossing)),
-        ("unstable without delay", f"{certificate.unstable_modes} roots"),
-        ("potential has a minimum", stable),
         ("published criterion says", _ms(certificate.published_max_delay_s)),
         ("certificate", str(path)),
     ]
     if certificate.common_multiplier_delay_s is not None:
-        rows.insert(2, ("with one multiplier", _ms(certificate.common_multiplier_delay_s)))
+        rows.insert(3, ("with one multiplier", _ms(certificate.common_multiplier_delay_s)))
     if certificate.time_varying_delay_s is not None:
-        rows.insert(3, ("with matrices that move", _ms(certificate.time_varying_delay_s)))
+        rows.insert(4, ("with matrices that move", _ms(certificate.time_varying_delay_s)))
     for name, value in rows:
         print(f"{name:26} {value}")
     for reason in certificate.reasons:
