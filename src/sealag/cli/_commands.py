@@ -25,12 +25,10 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     path = out or Path(f"{stem}.toml")
     if path.exists():
         raise FileError(f"{path} exists already; choose another name with --out.")
-    where = urdf
+    named = urdf
     if ":" not in urdf:
-        where = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
-    text = starter_project(urdf, floating_base=floating_base).replace(
-        f'urdf = "{urdf}"', f'urdf = "{where}"'
-    )
+        named = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
+    text = starter_project(urdf, floating_base=floating_base, named=named)
     write_text(path, text)
     return path
 
@@ -82,9 +80,7 @@ def _stability(certificate: Certificate) -> str:
     """What is known of stability at the worst instant, which a passive loop need not have."""
     if certificate.unstable_modes:
         count = certificate.unstable_modes
-        return (
-            f"no: {count} root{'s' * (count > 1)} unstable without delay (passive is not stable)"
-        )
+        return f"no: {count} root{'s' * (count > 1)} unstable without delay (passive is not stable)"
     if certificate.stable is None:
         known = certificate.local_loop is not None
         return "without delay yes: no unstable root" if known else "not known"
