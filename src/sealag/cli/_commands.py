@@ -2,6 +2,8 @@
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +35,16 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     return path
 
 
+@contextmanager
+def _busy(what: str) -> Iterator[None]:
+    """Say on a terminal's standard error what takes its time."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    with console.status(what) if console.is_terminal else nullcontext():
+        yield
+
+
 def _motion(system: System, path: Path | None) -> Motion | None:
     chosen = path or system.motion_file
     return None if chosen is None else load_motion(chosen, system.robot, contacts=system.contacts)
@@ -54,13 +66,14 @@ def certify_project(
     if proofs != "all" and not (proofs.isascii() and proofs.isdigit() and int(proofs) > 0):
         raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
     system = load(project)
-    certificate = certify(
-        system,
-        _motion(system, motion),
-        criterion=criterion,
-        time_varying=time_varying,
-        proofs=None if proofs == "all" else int(proofs),
-    )
+    with _busy("certifying"):
+        certificate = certify(
+            system,
+            _motion(system, motion),
+            criterion=criterion,
+            time_varying=time_varying,
+            proofs=None if proofs == "all" else int(proofs),
+        )
     path = out or Path(f"{resolve_project(project).stem}.certificate.json")
     write_certificate(certificate, path)
     if as_json:
@@ -128,7 +141,8 @@ def margin_project(
 
     system = load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
-    found = local_margins(system, _motion(system, motion), horizon=horizon)
+    with _busy("computing margins"):
+        found = local_margins(system, _motion(system, motion), horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)

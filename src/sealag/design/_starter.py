@@ -110,8 +110,14 @@ def _middle(robot: Robot, index: int) -> float:
 
 
 def _feet(robot: Robot) -> list[str]:
+    """Links that are called feet, at most four; of those that move as one the lowest."""
     words = ("foot", "sole", "toe")
-    return [name for name in robot.link_names() if any(w in name.lower() for w in words)][:4]
+    names = [name for name in robot.link_names() if any(w in name.lower() for w in words)]
+    lowest: dict[int, tuple[float, str]] = {}
+    for name, joint in zip(names, robot.frame_mounts(names)[0].tolist(), strict=True):
+        height = float(robot.frame_placement(name, robot.neutral())[1][2])
+        lowest[joint] = min(lowest.get(joint, (np.inf, name)), (height, name))
+    return [name for _, name in lowest.values()][:4]
 
 
 def _contacts(robot: Robot, feet: list[str]) -> str:
