@@ -158,7 +158,8 @@ class Plant:
             raise InputError(
                 f"the physics step of {self.step_length * 1e3:g} ms is too long: the link of "
                 f"{joint} swings on its spring at {fastest:.0f} rad/s; use at most "
-                f"{0.5e3 * _STABLE / fastest:.1g} ms (simulation.physics_step_ms)"
+                f"{0.5e3 * _STABLE / fastest:.1g} ms (simulation.physics_step_ms), "
+                "or is the spring too stiff for the link's inertia?"
             )
 
     @property
