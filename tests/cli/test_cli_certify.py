@@ -168,7 +168,7 @@ def test_starter_file_certifies_once_filled(tmp_path, capsys):
     code, _, err = run(capsys, "certify", path)
     assert code == 2
     assert "still to be filled in" in err
-    text = path.read_text()
+    text = path.read_text().replace('"FILL: rad"', "0.1")
     for fill, value in (
         ("FILL: K,", "350.0"), ("FILL: beta", "0.5"), ("FILL: D_theta", "50.0"),
         ("FILL: 1/s", "100.0"), ("FILL: T_H", "10.0"), ("FILL: T_L", "2.0"), ("FILL: B ", "0.1"),
@@ -178,10 +178,27 @@ def test_starter_file_certifies_once_filled(tmp_path, capsys):
     path.write_text(text)
     code, out, err = run(capsys, "certify", path, "--json", "--out", tmp_path / "c.json")
     assert (code, err) == (0, "")
-    assert json.loads(out)["status"] == "certified"
+    answer = json.loads(out)
+    assert answer["status"] == "certified"
+    _, out, _ = run(capsys, "certify", path, "--out", tmp_path / "c.json")
+    assert answer["unstable_modes"] > 0
+    assert out.splitlines()[1].startswith("stable                     no: ")
     code, _, err = run(capsys, "init", bundled_robot_path("hume"), "--out", path)
     assert code == 2
     assert "exists already" in err
+
+
+def test_help_and_version(capsys):
+    import sealag
+
+    code, out, _ = run(capsys, "--version")
+    assert (code, out) == (0, f"sealag {sealag.__version__}\n")
+    for ask in (["-h"], ["--help"]):
+        code, out, _ = run(capsys, *ask)
+        assert code == 0
+        assert "130 interrupted" in " ".join(out.split())
+    assert "Motion to certify" not in run(capsys, "margin", "-h")[1]
+    assert run(capsys, "--versions")[0] == 2
 
 
 def test_installed_command_prints_json_only(tmp_path):

@@ -53,6 +53,8 @@ def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, 
     assert np.isfinite(joints.values).all()
     assert "[robot]" in recording.attachments["project.toml"].decode()
     assert recording.metadata["outcome"] == "completed"
+    frames = {name.rsplit(":", 1)[0] for name in recording.signals["/tf"].names}
+    assert frames == set(load(EXAMPLES / f"{robot}.toml").robot.link_names())
     topics = {"/tf", "/energy", "/work", "/power/port", "/torque/spring", "/delay"}
     assert topics <= set(recording.signals)
     fixed = robot in ("baxter", "hume_held")
@@ -135,6 +137,25 @@ def test_a_fall_is_a_named_result(tmp_path, capsys):
     assert read_recording(tmp_path / "r.mcap").complete
 
 
+def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, capsys, monkeypatch):
+    out = tmp_path / "r.mcap"
+    out.write_bytes(b"before")
+
+    def interrupted(*_arguments, **_options):
+        raise KeyboardInterrupt
+
+    arguments = (EXAMPLES / "baxter.toml", "--duration", "0.01", "--out", out)
+    with monkeypatch.context() as patch:
+        patch.setattr("sealag.report._mcap.McapRecorder.note", interrupted)
+        code, text, err = run(capsys, *arguments)
+    assert (code, text) == (130, "")
+    assert "nothing was recorded" in err
+    assert err.endswith("sealag: interrupted\n")
+    assert out.read_bytes() == b"before"
+    assert run(capsys, *arguments)[0] == 0
+    assert read_recording(out).metadata["outcome"] == "completed"
+
+
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
@@ -142,11 +163,12 @@ def test_a_fall_is_a_named_result(tmp_path, capsys):
         (["--duration", "0"], "duration"),
         (["--duration", "nan"], "duration"),
         (["--delay-scale", "-1"], "delay_scale"),
+        (["--out", ""], "folder"),
     ],
 )
 def test_bad_scenarios_are_named(arguments, word, tmp_path, capsys):
     out = tmp_path / "r.mcap"
-    code, text, err = run(capsys, EXAMPLES / "anymal.toml", *arguments, "--out", out)
+    code, text, err = run(capsys, EXAMPLES / "anymal.toml", "--out", out, *arguments)
     assert (code, text) == (2, "")
     assert word in err
     assert err.count("\n") == 1

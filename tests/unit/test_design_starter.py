@@ -1,21 +1,37 @@
-"""A starter file names the robot's own joints and feet, each once."""
+"""A starter file names the robot's own joints and feet, and a posture that it can stand in."""
 
 import tomllib
 
+import numpy as np
 import pytest
 
 from sealag.design import starter_project
-from sealag.robot import load_robot, resolve_urdf
+from sealag.design._project import parse_project
+from sealag.design._schema import Project
+from sealag.errors import ProjectError
+from sealag.robot import load_robot, reference_posture, resolve_urdf
 
+ANYMAL = "example-robot-data:anymal_b_simple_description/robots/anymal.urdf"
+TALOS = "example-robot-data:talos_data/robots/talos_reduced.urdf"
 ROBOTS = {
     "bundled:hume.urdf": {"left_foot", "right_foot"},
-    "example-robot-data:anymal_b_simple_description/robots/anymal.urdf": {
-        "LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT",
-    },
-    "example-robot-data:talos_data/robots/talos_reduced.urdf": {
-        "left_sole_link", "right_sole_link",
-    },
-}  # fmt: skip
+    ANYMAL: {"LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"},
+    TALOS: {"left_sole_link", "right_sole_link"},
+}
+ODD = """<robot name='a "robot"'>
+<link name="base"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name='the "foot"\\&#10;'><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name='j"\\&#10;é' type="prismatic"><parent link="base"/><child link='the "foot"\\&#10;'/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+
+def filled(text):
+    """The project as it is checked, every FILL replaced by 1."""
+    parts = text.split('"FILL')
+    whole = parts[0] + "".join("1.0" + part[part.index('"') + 1 :] for part in parts[1:])
+    return parse_project(whole.encode(), "starter.toml")
 
 
 @pytest.mark.parametrize("urdf", ROBOTS)
@@ -35,3 +51,77 @@ def test_a_fixed_robot_has_no_base_and_no_feet():
     assert data["robot"]["base"] == "fixed"
     assert "contacts" not in data
     assert "base_position" not in data["posture"]
+    assert set(data["posture"]["joints"].values()) == {0}
+
+
+@pytest.mark.parametrize(("urdf", "knee"), [(ANYMAL, "LF_KFE"), (TALOS, "leg_left_4_joint")])
+def test_the_posture_is_the_maker_s_and_stands_on_the_ground(urdf, knee):
+    path = resolve_urdf(urdf)
+    posture = filled(starter_project(path, floating_base=True)).posture
+    robot = load_robot(path, floating_base=True)
+    assert abs(posture.joints[knee]) > 0.5
+    q = robot.configuration(posture.joints, base_position=posture.base_position)
+    heights = [robot.frame_placement(foot, q)[1][2] for foot in ROBOTS[urdf]]
+    assert min(heights) == pytest.approx(0.0, abs=1e-4)
+    assert max(heights) < 0.01
+    straight = robot.configuration({}, base_position=posture.base_position)
+    assert robot.frame_placement(next(iter(ROBOTS[urdf])), straight)[1][2] < -0.02
+
+
+def test_without_a_named_posture_the_legs_are_left_to_the_user():
+    path = resolve_urdf("bundled:hume.urdf")
+    assert reference_posture(load_robot(path, floating_base=True)) is None
+    text = starter_project(path, floating_base=True)
+    assert text.count('"FILL: rad"') == 6
+    assert 'left_knee = "FILL: rad"' in text
+
+
+def test_commented_keys_are_the_schema_s_with_its_defaults():
+    text = starter_project(resolve_urdf("bundled:hume.urdf"), floating_base=True)
+    plain = filled(text)
+    lines = [line.removeprefix("# ") if " = " in line or "[" in line else line
+             for line in text.splitlines()]  # fmt: skip
+    start = next(k for k, line in enumerate(lines) if line.startswith("# SI units"))
+    given = filled("\n".join(lines[start:]))
+    assert given.controller == plain.controller
+    assert given.delays == plain.delays
+    stated = {"physics_step_ms", "torsional_radius", "pushes"}
+    assert given.simulation.model_dump(exclude=stated) == plain.simulation.model_dump(
+        exclude=stated
+    )
+    assert set(given.simulation.model_fields_set) == set(type(given.simulation).model_fields)
+    assert set(given.actuators.default.model_fields_set) == set(
+        type(given.actuators.default).model_fields
+    )
+    assert set(given.controller.model_fields_set) == set(type(given.controller).model_fields)
+    assert {"motion", "walking"} <= given.model_fields_set <= set(Project.model_fields)
+    with pytest.raises(ProjectError, match="frictoin"):
+        filled("\n".join(lines[start:]).replace("\nfriction", "\nfrictoin", 1))
+
+
+def test_odd_names_are_escaped(tmp_path):
+    path = tmp_path / "odd.urdf"
+    path.write_text(ODD, encoding="utf-8")
+    data = tomllib.loads(starter_project(path, floating_base=True, named='a "b".urdf'))
+    assert data["robot"]["urdf"] == 'a "b".urdf'
+    assert data["robot"]["actuated"] == ['j"\\\né']
+    assert list(data["posture"]["joints"]) == ['j"\\\né']
+    assert [contact["frame"] for contact in data["contacts"]] == ['the "foot"\\\n']
+
+
+def test_a_posture_of_another_robot_is_not_taken(tmp_path):
+    anymal = resolve_urdf(ANYMAL)
+    robot = load_robot(anymal, floating_base=True)
+    found = reference_posture(robot)
+    assert found is not None
+    assert found.name.startswith("standing")
+    assert np.isfinite(list(found.joints.values())).all()
+    copy = tmp_path / "anymal.urdf"
+    copy.write_bytes(anymal.read_bytes())
+    (tmp_path / "other.srdf").write_bytes(found.file.read_bytes().replace(b"_KFE", b"_KNEE"))
+    moved = reference_posture(load_robot(copy, floating_base=True))
+    assert moved is not None
+    assert moved.joints["LF_KFE"] == 0.0
+    (tmp_path / "other.srdf").write_bytes(found.file.read_bytes().replace(b"LF_", b"X_").replace(
+        b"RF_", b"Y_").replace(b"LH_", b"Z_"))  # fmt: skip
+    assert reference_posture(load_robot(copy, floating_base=True)) is None

@@ -56,16 +56,41 @@ def test_an_independent_reader_sees_foxglove_messages(tmp_path):
     names = {name for name, _, _ in found}
     assert {"foxglove.JointStates", "foxglove.FrameTransforms", "sealag.energy"} == names
     assert len(found) == 9
+    _, _, joints = next(item for item in found if item[1] == "/joint_states")
+    assert joints["timestamp"] == {"sec": 0, "nsec": 0}
+    assert [joint["name"] for joint in joints["joints"]] == list(JOINTS)
+    assert set(joints["joints"][0]) == {"name", "position", "velocity", "effort"}
+    last = [message for _, topic, message in found if topic == "/tf"][-1]["transforms"][0]
+    assert last["timestamp"] == {"sec": 0, "nsec": 2_000_000}
+    assert (last["parent_frame_id"], last["child_frame_id"]) == ("world", "base")
+    assert set(last["rotation"]) == {"x", "y", "z", "w"}
 
 
-def test_interrupted_recording_is_closed_and_readable(tmp_path):
+def test_ctrl_c_keeps_the_recording_before(tmp_path):
     path = tmp_path / "run.mcap"
+    _write(path, count=3)
     with pytest.raises(KeyboardInterrupt), McapRecorder(path=path, joints=JOINTS) as recorder:
         recorder.write_signal("/x", ["a"], [0.0, 1.0], values=[[1.0], [2.0]])
         raise KeyboardInterrupt
-    recording = read_recording(path)
-    assert recording.complete
-    np.testing.assert_array_equal(recording.signals["/x"].values[:, 0], [1.0, 2.0])
+    assert len(read_recording(path).signals["/energy"].time) == 3
+    assert os.listdir(tmp_path) == ["run.mcap"]
+    with pytest.raises(RuntimeError), McapRecorder(path=path, joints=JOINTS) as recorder:
+        recorder.write_signal("/x", ["a"], [0.0, 1.0], values=[[1.0], [2.0]])
+        raise RuntimeError
+    np.testing.assert_array_equal(read_recording(path).signals["/x"].values[:, 0], [1.0, 2.0])
+
+
+def test_names_and_numbers_that_json_spells_otherwise(tmp_path):
+    """Quotes, percent signs and letters in names; the least and the largest of numbers."""
+    names = ['a "b"', "100 %s", "é\\n"]
+    values = np.array([[1e-300, -0.0, 1e300], [np.inf, 0.1, 12345678901234567.0]])
+    path = tmp_path / "run.mcap"
+    with McapRecorder(path=path, joints=JOINTS) as recorder:
+        recorder.write_signal("/x", names, [0.0, 1.5], values=values)
+    signal = read_recording(path).signals["/x"]
+    assert signal.names == tuple(names)
+    np.testing.assert_array_equal(signal.values, values)
+    np.testing.assert_array_equal(signal.time, [0.0, 1.5])
 
 
 def test_truncated_file_gives_what_it_holds(tmp_path):

@@ -1,6 +1,7 @@
 """The first law on Hume, with nothing lost and with everything on; and the passivity observer."""
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,6 +96,20 @@ def test_nothing_lost_on_a_held_foot(hume):
     assert run.audit.throughput[-1] > 10
     for name in ("viscous", "coulomb", "spring_damping", "damping"):
         assert np.abs(run.audit.joint_flows[name]).max() < 1e-9
+
+
+def test_rounding_of_stores_at_rest_is_no_open_book(hume):
+    q = _standing(hume)
+    springs = actuators(hume.joints, spring_stiffness=1e3, rotor_inertia=ROTOR, motor_damping=1.0)
+    run = closed_loop(hume, springs, JointPD(q[-6:], stiffness=200.0), q=q, duration=0.01)
+    stored = np.abs(list(run.audit.stores.values())).sum(axis=0).max()
+    ones = np.ones_like(run.time)
+    for error, largest in ((1e-14, 1e-7), (1e-6, 2.0)):
+        still = replace(run.audit, throughput=1e-13 * ones, residual=error * stored * ones)
+        assert still.closure == pytest.approx(1e6 * error)
+        assert still.closure < largest
+    moved = replace(run.audit, throughput=stored * ones, residual=1e-14 * stored * ones)
+    assert moved.closure == pytest.approx(1e-14)
 
 
 def test_everything_on_closes(hume):

@@ -422,6 +422,23 @@ def test_too_soft_springs_are_refused_at_the_first_tick(feedback):
         build(BAXTER, (), motors=motors).tick(0.0, measured, out)
 
 
+def test_a_reference_out_of_reach_is_not_called_too_soft_springs():
+    rows = BAXTER.hierarchy.levels(BAXTER.robot)[-1]
+
+    def build_far(far):
+        reference = lambda _t: (far * np.eye(rows)[0], np.zeros(rows))  # noqa: E731
+        controller = build(BAXTER, (), feedback=Feedback.STATIC_JOINT, reference=reference)
+        controller.reset(0.0, at_posture(BAXTER))
+        return controller
+
+    out = np.zeros(BAXTER.robot.n)
+    build_far(1e-3).tick(0.0, at_posture(BAXTER), out)
+    far = build_far(1e6)
+    assert far.contraction < 1.0
+    with pytest.raises(ContractionError, match=r"not found.*out of reach"):
+        far.tick(0.0, at_posture(BAXTER), out)
+
+
 def test_contraction_is_the_one_that_is_certified():
     for system, contacts in STANCES.values():
         controller, stack = build(system, contacts), certified(system, contacts)

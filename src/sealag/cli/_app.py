@@ -9,12 +9,19 @@ from typing import Annotated, Any
 
 import typer
 
+from sealag import __version__
 from sealag.errors import SealagError
+
+INTERRUPTED = 130
+"""Exit status with which Typer answers Ctrl-C."""
 
 app = typer.Typer(
     name="sealag",
     help="How much network delay a robot with springs in its joints tolerates.",
+    epilog="Exit status: 0 done, 1 the answer is no (not certified, certificate does not hold), "
+    "2 the input is wrong, 130 interrupted.",
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -24,8 +31,28 @@ Project = Annotated[str, typer.Argument(help="Project file (TOML), or bundled:hu
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 MotionFile = Annotated[
     Path | None,
-    typer.Option("--motion", help="Motion to certify: CSV, NPZ or Parquet with named columns."),
+    typer.Option(
+        "--motion",
+        help="Motion along which to look: CSV, NPZ or Parquet with named columns; the project's "
+        "motion, else its posture, if not given.",
+    ),
 ]
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        print(f"sealag {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version."),
+    ] = False,
+) -> None:
+    """Options of the program itself."""
 
 
 @app.command()
@@ -50,7 +77,8 @@ def certify(
     project: Project,
     motion: MotionFile = None,
     criterion: Annotated[
-        str | None, typer.Option("--criterion", help="certified or published.")
+        str | None,
+        typer.Option("--criterion", help="certified or published; the project's if not given."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -135,10 +163,23 @@ def verify(
 def simulate(
     project: Project,
     scenario: Annotated[
-        str | None, typer.Option("--scenario", help="regulate, track, drop, balance or walk.")
+        str | None,
+        typer.Option(
+            "--scenario",
+            help="regulate, track, drop, balance or walk; simulation.scenario if not given.",
+        ),
     ] = None,
-    duration: Annotated[float | None, typer.Option("--duration", help="Seconds.")] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Of jitter and losses.")] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            "--duration",
+            help="Seconds; simulation.duration_s, or the length of the walk, if not given.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", help="Of jitter and losses; simulation.seed if not given."),
+    ] = None,
     delay_scale: Annotated[
         float, typer.Option("--delay-scale", help="Factor on both round trips.")
     ] = 1.0,
@@ -198,9 +239,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except SealagError as error:
         print(f"sealag: {error}", file=sys.stderr)
         raise SystemExit(2) from None
-    except KeyboardInterrupt:
-        print("sealag: interrupted", file=sys.stderr)
-        raise SystemExit(130) from None
+    except SystemExit as end:
+        if end.code == INTERRUPTED:
+            print("sealag: interrupted", file=sys.stderr)
+        raise
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(0) from None

@@ -2,6 +2,8 @@
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +27,22 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     path = out or Path(f"{stem}.toml")
     if path.exists():
         raise FileError(f"{path} exists already; choose another name with --out.")
-    where = urdf
+    named = urdf
     if ":" not in urdf:
-        where = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
-    text = starter_project(urdf, floating_base=floating_base).replace(
-        f'urdf = "{urdf}"', f'urdf = "{where}"'
-    )
+        named = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
+    text = starter_project(urdf, floating_base=floating_base, named=named)
     write_text(path, text)
     return path
+
+
+@contextmanager
+def _busy(what: str) -> Iterator[None]:
+    """Say on a terminal's standard error what takes its time."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    with console.status(what) if console.is_terminal else nullcontext():
+        yield
 
 
 def _motion(system: System, path: Path | None) -> Motion | None:
@@ -56,13 +66,14 @@ def certify_project(
     if proofs != "all" and not (proofs.isascii() and proofs.isdigit() and int(proofs) > 0):
         raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
     system = load(project)
-    certificate = certify(
-        system,
-        _motion(system, motion),
-        criterion=criterion,
-        time_varying=time_varying,
-        proofs=None if proofs == "all" else int(proofs),
-    )
+    with _busy("certifying"):
+        certificate = certify(
+            system,
+            _motion(system, motion),
+            criterion=criterion,
+            time_varying=time_varying,
+            proofs=None if proofs == "all" else int(proofs),
+        )
     path = out or Path(f"{resolve_project(project).stem}.certificate.json")
     write_certificate(certificate, path)
     if as_json:
@@ -78,15 +89,26 @@ def _ms(seconds: float | None) -> str:
     return f"{seconds * 1e3:.3f} ms" if np.isfinite(seconds) else "any"
 
 
+def _stability(certificate: Certificate) -> str:
+    """What is known of stability at the worst instant, which a passive loop need not have."""
+    if certificate.unstable_modes:
+        count = certificate.unstable_modes
+        return f"no: {count} root{'s' * (count > 1)} unstable without delay (passive is not stable)"
+    if certificate.stable is None:
+        known = certificate.local_loop is not None
+        return "without delay yes: no unstable root" if known else "not known"
+    return "yes" if certificate.stable else "no: the potential has no minimum"
+
+
 def _show_certificate(certificate: Certificate, path: Path) -> None:
     worst = certificate.worst
     shares = sorted(worst.direction.items(), key=lambda item: -item[1])
     limiting = ", ".join(f"{name} {share:.0%}" for name, share in shares[:3] if share >= 0.01)
     crossing = certificate.first_crossing_s
-    stable = {True: "yes", False: "no", None: "has no answer here"}[certificate.stable]
     verdict = certificate.status.value.replace("_", " ")
     rows = [
         ("verdict", f"{verdict} ({certificate.criterion} criterion)"),
+        ("stable", _stability(certificate)),
         ("largest delay", _ms(certificate.max_delay_s)),
         ("delay of the design", _ms(certificate.delay_s)),
         (
@@ -96,15 +118,13 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         ("gives in first", limiting),
         ("exact local margin there", _ms(certificate.local_margin_s)),
         ("first crossing there", _ms(crossing)),
-        ("unstable without delay", f"{certificate.unstable_modes} roots"),
-        ("potential has a minimum", stable),
         ("published criterion says", _ms(certificate.published_max_delay_s)),
         ("certificate", str(path)),
     ]
     if certificate.common_multiplier_delay_s is not None:
-        rows.insert(2, ("with one multiplier", _ms(certificate.common_multiplier_delay_s)))
+        rows.insert(3, ("with one multiplier", _ms(certificate.common_multiplier_delay_s)))
     if certificate.time_varying_delay_s is not None:
-        rows.insert(3, ("with matrices that move", _ms(certificate.time_varying_delay_s)))
+        rows.insert(4, ("with matrices that move", _ms(certificate.time_varying_delay_s)))
     for name, value in rows:
         print(f"{name:26} {value}")
     for reason in certificate.reasons:
@@ -123,7 +143,8 @@ def margin_project(
 
     system = load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
-    found = local_margins(system, _motion(system, motion), horizon=horizon)
+    with _busy("computing margins"):
+        found = local_margins(system, _motion(system, motion), horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)

@@ -1,19 +1,23 @@
 """`sealag simulate`: run, record, and account for the energy."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 import sealag
 from sealag.cli._app import show_json
 from sealag.design import System, load, resolve_project, scenario_duration, simulate
-from sealag.errors import InputError
+from sealag.errors import FileError, InputError
 from sealag.paper import WalkCase, measure_walk
 from sealag.report import write_run
-from sealag.simulation import Passivity, Run
+from sealag.simulation import Outcome, Passivity, Run
 from sealag.typing import Array
+
+T = TypeVar("T")
+Progress = Callable[[float], None]
 
 
 def simulate_project(
@@ -27,11 +31,15 @@ def simulate_project(
     as_json: bool,
 ) -> None:
     """Run a scenario with a progress bar, write the recording and show the audit."""
+    path = out or Path(f"{resolve_project(project).stem}.mcap")
+    if path.is_dir():
+        raise FileError(f"--out is {path}, a folder; give the recording a file name in it.")
     system = load(project)
     length = scenario_duration(system, scenario) if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"--duration is {length}; a positive time in s is needed.")
     run = _with_progress(
+        "simulating",
         length,
         lambda progress: simulate(
             system,
@@ -42,8 +50,7 @@ def simulate_project(
             progress=progress,
         ),
     )
-    path = out or Path(f"{resolve_project(project).stem}.mcap")
-    write_run(run, system.robot, path, project=system.text, version=sealag.__version__)
+    _record(run, system, path)
     answer = summary(run, path)
     if (scenario or system.simulation.scenario) == "walk":
         answer |= gait_summary(system, run)
@@ -51,19 +58,47 @@ def simulate_project(
         show_json(answer)
     else:
         _show(run, answer)
-    if run.outcome.value == "interrupted":
+    if run.outcome is Outcome.INTERRUPTED:
         raise KeyboardInterrupt
 
 
-def _with_progress(length: float, call: Any) -> Run:
+def _record(run: Run, system: System, path: Path) -> None:
+    """Write the recording with a progress bar; Ctrl-C leaves the one before."""
+    end = float(run.time[-1])
+    if run.outcome is Outcome.INTERRUPTED:
+        print(
+            f"sealag: interrupted at {end:.3f} s; recording what was simulated (Ctrl-C again to "
+            f"leave {path} as it is)",
+            file=sys.stderr,
+        )
+    try:
+        _with_progress(
+            "recording",
+            end,
+            lambda progress: write_run(
+                run,
+                system.robot,
+                path,
+                project=system.text,
+                version=sealag.__version__,
+                progress=progress,
+            ),
+        )
+    except KeyboardInterrupt:
+        print(f"sealag: nothing was recorded; {path} is as it was", file=sys.stderr)
+        raise
+
+
+def _with_progress(name: str, length: float, call: Callable[[Progress | None], T]) -> T:
+    """Call with a function that moves a progress bar on a terminal, or with None."""
+    from rich import progress
     from rich.console import Console
-    from rich.progress import Progress
 
     console = Console(file=sys.stderr)
     if not console.is_terminal:
         return call(None)
-    with Progress(console=console, transient=True) as bar:
-        task = bar.add_task("simulating", total=length)
+    with progress.Progress(console=console, transient=True) as bar:
+        task = bar.add_task(name, total=length)
         return call(lambda t: bar.update(task, completed=t))
 
 
@@ -137,7 +172,8 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
     for name, values in books.stores.items():
         print(f"{name + ' energy':26} {values[0]:.4f} J at first, {values[-1]:.4f} J at last")
     for name, works in books.joint_flows.items():
-        print(f"{name + ' work':26} {float(works[-1].sum()):.4f} J")
+        label = f"{name.removesuffix('_work').replace('_', ' ')} work"
+        print(f"{label:26} {float(works[-1].sum()):.4f} J")
     print(
         f"{'first law':26} open by {answer['energy_residual_j']:.2e} J of "
         f"{answer['energy_throughput_j']:.4g} J moved"

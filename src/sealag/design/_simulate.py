@@ -32,6 +32,8 @@ from sealag.whole_body import Controller, ControllerOptions, TaskKind, TickContr
 SCENARIOS = ("regulate", "track", "drop", "balance", "walk")
 LONGEST_STEP = 1e-3
 """Longest physics step, and central period where the project states none, s."""
+SHORTEST_STEP = 1e-5
+"""Shortest physics step that is chosen where the project states none, s."""
 STEPS_PER_SWING = 8
 """Least number of physics steps in a period of the fastest spring."""
 
@@ -286,7 +288,7 @@ def _clock(system: System) -> Clock:
     if step is not None:
         return Clock(physics=step * 1e-3, embedded=embedded, central=central)
     whole = embedded or central
-    longest = min(LONGEST_STEP, _fastest_swing(system) / STEPS_PER_SWING)
+    longest = min(LONGEST_STEP, max(SHORTEST_STEP, _fastest_swing(system) / STEPS_PER_SWING))
     return Clock(
         physics=whole / math.ceil(whole / longest - 1e-9), embedded=embedded, central=central
     )

@@ -1,65 +1,28 @@
 """A commented project file for a robot, to be filled in."""
 
+import json
 from pathlib import Path
 
-from sealag.robot import Robot, load_robot
+import numpy as np
 
-_HEAD = """\
-# sealag project for {name}: what `sealag certify` needs to know besides the URDF.
-# Values that begin with FILL are not known from the URDF; replace each by a number.
-# SI units throughout; delays are in ms, as their keys say.
-
-[robot]
-urdf = "{urdf}"
-base = "{base}"          # "floating" or "fixed"
-actuated = [             # joints with an actuator; the others are locked at 0
-{actuated}
-]
-
-[posture]                # certified when no motion is given (--motion)
-{base_pose}
-[posture.joints]         # rad or m; those left out are 0
-{positions}
-
-[actuators.default]
-spring_stiffness = "FILL: K, Nm/rad"
-rotor_inertia = {rotor}
-inertia_shaping = "FILL: beta = B_s / B; 1 without torque feedback"
-motor_damping = "FILL: D_theta, Nms/rad, embedded and not delayed"
-# Joints that differ:
-# [actuators.joint.{joint}]
-# spring_stiffness = 350.0
-{contacts}
-[controller]
-feedback = "motor"             # motor | static_joint | static_joint_tank | joint
-gravity = "planned"            # feedback | planned | none
-stiffness_form = "symmetric"   # symmetric | published | force
-criterion = "certified"        # certified | published
-
-[[tasks]]
-name = "posture"
-kind = "posture"               # com | position | orientation | pose | posture
-stiffness = "FILL: 1/s^2, times the task inertia"
-priority = 1
-
-# Delays are constant, sinusoid (mean_ms, amplitude_ms, angular_frequency_rad_s), table (time_s,
-# delay_ms) or samples (file of measured ones in ms, period_s), each with jitter_ms, packet_loss,
-# max_burst and order ("fifo", "newest", "arrival") if packets are late or lost. Instead of a round
-# trip both of its ways may be given: central_up and central_down, embedded_up and embedded_down.
-[delays]
-central_round_trip = {{ kind = "constant", value_ms = "FILL: T_H, ms" }}
-embedded_round_trip = {{ kind = "constant", value_ms = "FILL: T_L, ms" }}
-sample_time_ms = 1.0           # period of the central controller; its hold is added
-# embedded_period_ms = 0.5     # at which the robot's side sends and looks; added for each link
-"""
+from sealag.design._starter_text import OPTIONAL, REQUIRED
+from sealag.robot import ReferencePosture, Robot, load_robot, reference_posture
+from sealag.typing import Array
 
 
-def starter_project(urdf: str | Path, *, floating_base: bool = False) -> str:
+def starter_project(
+    urdf: str | Path, *, floating_base: bool = False, named: str | None = None
+) -> str:
     """Write a starter project file for a robot, with its own joints in it.
+
+    The posture is one that an SRDF beside the URDF names. Without one the joints are at 0 or in
+    the middle of their range, and those that carry feet are left to be filled in: on straight legs
+    nothing is stable.
 
     Args:
         urdf: the robot, as `load_robot` takes it.
         floating_base: whether the root link moves freely.
+        named: how the file names the URDF; as `urdf` if None.
 
     Returns:
         TOML text that certifies once each FILL is replaced.
@@ -69,30 +32,75 @@ def starter_project(urdf: str | Path, *, floating_base: bool = False) -> str:
         RobotError: it is not a usable robot.
     """
     robot = load_robot(urdf, floating_base=floating_base)
+    feet = _feet(robot) if floating_base else []
+    reference = reference_posture(robot)
     rotor = robot.rotor_inertia
     known = bool((rotor > 0.0).all())
-    return _HEAD.format(
-        name=robot.name,
-        urdf=str(urdf).replace("\\", "/"),
+    required = REQUIRED.format(
+        name=_text(robot.name),
+        urdf=_text((str(urdf) if named is None else named).replace("\\", "/")),
         base="floating" if floating_base else "fixed",
-        actuated="\n".join(f'  "{name}",' for name in robot.joints),
-        base_pose=(
-            "base_position = [0.0, 0.0, 1.0]\nbase_quaternion_xyzw = [0.0, 0.0, 0.0, 1.0]\n"
-            if floating_base
-            else ""
-        ),
-        positions="\n".join(
-            f"{_key(name)} = {_middle(robot, k):.4g}" for k, name in enumerate(robot.joints)
-        ),
-        rotor=f"{rotor.min():.6g}" if known else '"FILL: B reflected to the joint, kg m^2"',
+        actuated="\n".join(f"  {_text(name)}," for name in robot.joints),
+        posture=_posture(robot, feet, reference),
+        rotor=f"{rotor.min():.6g}"
+        if known
+        else '"FILL: B reflected to the joint, kg m^2 (kg where the joint slides)"',
         joint=_key(robot.joints[0]),
-        contacts=_contacts(robot) if floating_base else "",
+        contacts=_contacts(robot, feet) if floating_base else "",
     )
+    frame = (feet or list(robot.link_names()))[-1]
+    pair = ", ".join(_text(name) for name in (feet[:2] if len(feet) > 1 else ("left", "right")))
+    return required + OPTIONAL.format(frame=_text(frame), feet=pair)
+
+
+def _text(name: str) -> str:
+    """A name as a TOML string."""
+    return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _key(name: str) -> str:
     plain = name.replace("_", "").replace("-", "")
-    return name if plain.isascii() and plain.isalnum() else f'"{name}"'
+    return name if plain.isascii() and plain.isalnum() else _text(name)
+
+
+def _posture(robot: Robot, feet: list[str], reference: ReferencePosture | None) -> str:
+    """The section's lines: base, and joints with where their values come from."""
+    carrying = np.zeros(robot.n, dtype=bool)
+    if reference is not None:
+        origin = f"{_text(reference.name)} of {_text(reference.file.name)}; rad or m"
+        positions = np.array([reference.joints[name] for name in robot.joints])
+    else:
+        origin = "rad or m; those left out are 0"
+        positions = np.array([_middle(robot, k) for k in range(robot.n)])
+        if feet:
+            carrying = robot.frame_mounts(feet)[3][:, robot.nv_base :].any(axis=0)
+            origin += "; on straight legs nothing is stable: bend the knees"
+    values = [
+        '"FILL: rad"' if fill else f"{value:.4g}"
+        for value, fill in zip(positions, carrying, strict=True)
+    ]
+    joints = [f"{_key(name)} = {value}" for name, value in zip(robot.joints, values, strict=True)]
+    height = None if carrying.any() else _height(robot, feet, positions)
+    return "\n".join([*_base(robot, feet, height), f"[posture.joints]         # {origin}", *joints])
+
+
+def _base(robot: Robot, feet: list[str], height: float | None) -> list[str]:
+    if not robot.floating_base:
+        return []
+    comment = "m" if not feet else "m; `sealag simulate` moves it until the feet touch the ground"
+    z = 1.0 if height is None else height
+    return [
+        f"base_position = [0.0, 0.0, {z:.4f}]  # {comment}",
+        "base_quaternion_xyzw = [0.0, 0.0, 0.0, 1.0]",
+    ]
+
+
+def _height(robot: Robot, feet: list[str], positions: Array) -> float | None:
+    """Height of the base at which the lowest foot is on the ground, m; None without feet."""
+    if not feet:
+        return None
+    q = robot.configuration(positions)
+    return -min(float(robot.frame_placement(foot, q)[1][2]) for foot in feet)
 
 
 def _middle(robot: Robot, index: int) -> float:
@@ -101,12 +109,23 @@ def _middle(robot: Robot, index: int) -> float:
     return 0.0 if low <= 0.0 <= high else (low + high) / 2.0
 
 
-def _contacts(robot: Robot) -> str:
-    frames = robot.link_names()
-    feet = [name for name in frames if any(w in name.lower() for w in ("foot", "sole", "toe"))]
+def _feet(robot: Robot) -> list[str]:
+    """Links that are called feet, at most four; of those that move as one the lowest."""
+    words = ("foot", "sole", "toe")
+    names = [name for name in robot.link_names() if any(w in name.lower() for w in words)]
+    lowest: dict[int, tuple[float, str]] = {}
+    for name, joint in zip(names, robot.frame_mounts(names)[0].tolist(), strict=True):
+        height = float(robot.frame_placement(name, robot.neutral())[1][2])
+        lowest[joint] = min(lowest.get(joint, (np.inf, name)), (height, name))
+    return [name for _, name in lowest.values()][:4]
+
+
+def _contacts(robot: Robot, feet: list[str]) -> str:
     lines = ["", "# Frames that the ground holds: a point (3 forces) or a surface (6)."]
-    for name in feet[:4]:
-        lines += ["[[contacts]]", f'frame = "{name}"', 'kind = "point"']
+    for name in feet:
+        lines += ["[[contacts]]", f"frame = {_text(name)}", 'kind = "point"']
     if not feet:
-        lines += ["# [[contacts]]", f'# frame = "{frames[-1]}"', '# kind = "point"']
+        frame = _text(robot.link_names()[-1])
+        lines.append("# No link is called a foot: without contacts the robot flies.")
+        lines += ["# [[contacts]]", f"# frame = {frame}", '# kind = "point"']
     return "\n".join([*lines, ""])

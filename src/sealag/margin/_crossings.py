@@ -12,6 +12,7 @@ from sealag.typing import Array
 _ON_LINE = 1e-5
 _SLOW = 1e-6
 _STEPS = 30
+_EXACT = 1e-12
 _STATIC = 1e-8
 _APART = 1e-2
 _REACH = 1e-4
@@ -93,6 +94,8 @@ def _refine(transfer: Transfer, omega: float, *, nu: complex, reach: float) -> C
         miss = value.real + 0.5
         if abs(miss) < best[0]:
             best = (abs(miss), omega, value, slope)
+        elif abs(miss) < _EXACT * abs(value):
+            break
         rate = (1j * slope).real
         if abs(miss) < 4e-16 * abs(value) or rate == 0.0:
             break

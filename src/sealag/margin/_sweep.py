@@ -3,7 +3,8 @@
 An interval of frequencies is excluded when every disc that must hold an eigenvalue of
 G(ω), for all ω in it, misses the line Re(z_0 ν) = −½. Two enclosures are used: Gershgorin's after
 the eigenvectors at the centre, and Henrici's from the departure from normality, which needs no
-eigenvectors. What is left is bisected until it is a point.
+eigenvectors. What is left is split about the crossing that Newton's step from its centre points
+to, and in halves where it points to none, until it is a point.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from sealag.margin._loop import Transfer
 from sealag.typing import Array, BoolArray, IntArray
 
 _NARROW = 2e-9
+_BLURRED = 1e-6
+_ZOOM = 64.0
 _FLOOR = 1e-4
 _SLOW = 1e-4
 _TINY = 1e-14
@@ -76,20 +79,28 @@ def candidate_bands(transfer: Transfer, *, zero_root: bool) -> list[Cluster]:
                 "The frequency sweep does not close: the loop is too close to losing stability "
                 "over a whole band of frequencies, or its matrices are badly scaled."
             )
-        open_ = np.concatenate(
-            [
-                ~excluded(transfer, lower[i : i + _CHUNK], upper[i : i + _CHUNK])
-                for i in range(0, len(lower), _CHUNK)
-            ]
-        )
-        lower, upper = lower[open_], upper[open_]
-        slow = upper <= floor
-        final = upper - lower <= np.where(slow, _SLOW * floor, _NARROW * upper)
-        narrow += list(zip(lower[final], upper[final], strict=True))
-        lower, upper = lower[~final], upper[~final]
-        middle = (lower + upper) / 2.0
-        lower, upper = np.concatenate([lower, middle]), np.concatenate([middle, upper])
+        parts = [
+            _examine(transfer, lower[i : i + _CHUNK], upper[i : i + _CHUNK])
+            for i in range(0, len(lower), _CHUNK)
+        ]
+        excluded, crossing, blurred = (np.concatenate(part) for part in zip(*parts, strict=True))
+        narrowest = np.where(blurred, _BLURRED, _NARROW) * upper
+        final = upper - lower <= np.where(upper <= floor, _SLOW * floor, narrowest)
+        narrow += list(zip(lower[~excluded & final], upper[~excluded & final], strict=True))
+        wide = ~excluded & ~final
+        lower, upper = _split(lower[wide], upper[wide], crossing[wide])
     return _merged(sorted(narrow))
+
+
+def _split(lower: Array, upper: Array, crossing: Array) -> tuple[Array, Array]:
+    """Cut intervals on both sides of the expected crossing, or in the middle if it lies outside."""
+    inside = (crossing > lower) & (crossing < upper)
+    guard = np.maximum((upper - lower) / (2.0 * _ZOOM), 0.45 * _NARROW * upper)
+    middle = (lower + upper) / 2.0
+    left = np.where(inside, np.maximum(crossing - guard, lower), middle)
+    right = np.where(inside, np.minimum(crossing + guard, upper), middle)
+    first, last = np.concatenate([lower, left, right]), np.concatenate([left, right, upper])
+    return first[last > first], last[last > first]
 
 
 def _merged(bands: list[tuple[float, float]]) -> list[Cluster]:
@@ -102,18 +113,14 @@ def _merged(bands: list[tuple[float, float]]) -> list[Cluster]:
     return merged
 
 
-def excluded(transfer: Transfer, lower: Array, upper: Array) -> BoolArray:
-    """Tell which intervals surely hold no crossing.
+def _examine(transfer: Transfer, lower: Array, upper: Array) -> tuple[BoolArray, Array, BoolArray]:
+    """Tell which of N intervals (rad/s) surely hold no crossing, and where one is expected (N,).
 
-    Args:
-        transfer: G about its reference.
-        lower: (N,) lower ends, rad/s.
-        upper: (N,) upper ends, rad/s.
-
-    Returns:
-        (N,) True where every eigenvalue stays off the line throughout the interval.
+    Excluded is where every eigenvalue stays off the line throughout the interval. Third, where
+    the eigenvalue nearest to the line moves less than rounding blurs it: to split is of no use.
     """
     centre, half = (lower + upper) / 2.0, (upper - lower) / 2.0
+    crossing, blurred = np.full(len(centre), np.nan), np.zeros(len(centre), dtype=bool)
     with np.errstate(all="ignore"):
         expand = _resolvent if transfer.left is None else _modal
         change = expand(transfer, centre, half)
@@ -123,10 +130,11 @@ def excluded(transfer: Transfer, lower: Array, upper: Array) -> BoolArray:
         rest = np.flatnonzero(~done)
         if len(rest):
             some = change.only(rest)
-            done[rest] = _gershgorin(
+            done[rest], step, blurred[rest] = _gershgorin(
                 nu[rest], X[rest], some, half=half[rest], turn=transfer.reference
             )
-        return done
+            crossing[rest] = centre[rest] + step
+        return done, crossing, blurred
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +166,8 @@ class _Change:
     def seen(self, X: Array, inverse: Array) -> tuple[Array, Array]:
         """Return bounds of X⁻¹ (G(ω) − G) X (N, r, r) and of the diagonal of its rest (N, r)."""
         rows = np.abs(inverse @ self.left)
-        columns, further = np.abs(self.right @ X), np.abs(self.further @ X)
+        columns = np.abs(self.right @ X)
+        further = columns if self.further is self.right else np.abs(self.further @ X)
         if self.full:
             rows = np.linalg.norm(rows, axis=2, keepdims=True)
             columns = np.linalg.norm(columns, axis=1, keepdims=True)
@@ -219,8 +228,13 @@ def _resolvent(transfer: Transfer, centre: Array, half: Array) -> _Change:
     )
 
 
-def _gershgorin(nu: Array, X: Array, change: _Change, *, half: Array, turn: complex) -> BoolArray:
+def _gershgorin(
+    nu: Array, X: Array, change: _Change, *, half: Array, turn: complex
+) -> tuple[BoolArray, Array, BoolArray]:
     """Discs about eigenvalues that move with their known slope, in the eigenvectors' basis.
+
+    Also returns, for the eigenvalue nearest to the line, Newton's step to it, rad/s, and whether
+    rounding exceeds its motion.
 
     The basis vector of the eigenvalue nearest to the line is scaled so that the other discs just
     miss the line; its own radius is then of second order in the interval's width.
@@ -230,11 +244,12 @@ def _gershgorin(nu: Array, X: Array, change: _Change, *, half: Array, turn: comp
     safe = np.where(usable[:, None, None], X, np.eye(X.shape[-1]))
     inverse = np.linalg.inv(safe)
     bound, rest = change.seen(safe, inverse)
-    travel = turn * np.einsum("nij,njk,nki->ni", inverse, change.slope, safe)
+    travel = turn * ((inverse @ change.slope) * np.swapaxes(safe, 1, 2)).sum(axis=2)
     moved = half[:, None] * np.abs(travel.real)
     at = np.arange(nu.shape[1])
     bound[:, at, at] = 0.0
-    gap = np.abs(nu.real + 0.5) - moved - rest - (change.rounding * condition)[:, None]
+    blur = change.rounding * condition
+    gap = np.abs(nu.real + 0.5) - moved - rest - blur[:, None]
     nearest = (gap - bound.sum(axis=2)).argmin(axis=1)
     one = np.arange(len(nu))
     coupling = bound[one, :, nearest]
@@ -242,7 +257,8 @@ def _gershgorin(nu: Array, X: Array, change: _Change, *, half: Array, turn: comp
     room[one, nearest] = np.inf
     scale = np.where(coupling > 0.0, coupling / room, 0.0).max(axis=1)
     own = gap[one, nearest] - 1.0001 * scale * bound[one, nearest].sum(axis=1)
-    return usable & (room > 0.0).all(axis=1) & (own > 0.0)
+    step = -(nu[one, nearest].real + 0.5) / travel[one, nearest].real
+    return usable & (room > 0.0).all(axis=1) & (own > 0.0), step, moved[one, nearest] < blur
 
 
 def _henrici(nu: Array, change: _Change, *, gap: Array) -> BoolArray:

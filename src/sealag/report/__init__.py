@@ -1,7 +1,8 @@
 """What a person looks at: plots, self-contained HTML pages and MCAP recordings."""
 
 from sealag.report._bounds_page import beyond_section, figure_5_section, limits_section
-from sealag.report._mcap import McapRecorder, RecordingFile, Signal, read_recording
+from sealag.report._mcap import McapRecorder
+from sealag.report._mcap_reader import RecordingFile, Signal, read_recording
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page
 from sealag.report._paper_page import write_paper_page
 from sealag.report._plots import (

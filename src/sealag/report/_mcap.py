@@ -1,11 +1,11 @@
-"""Recordings as MCAP: joint states, transforms and named signals that Foxglove opens."""
+"""Recordings as MCAP, written: joint states, transforms and named signals that Foxglove opens."""
 
 import errno
 import json
 import os
-import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 
 from sealag.errors import FileError, InputError
-from sealag.typing import Array, ArrayLike
+from sealag.typing import ArrayLike
 
 CHUNK_BYTES = 256 * 1024
 RESERVE_BYTES = 4 * CHUNK_BYTES
@@ -21,6 +21,10 @@ RESERVE_BYTES = 4 * CHUNK_BYTES
 
 JOINT_STATES = "/joint_states"
 TRANSFORMS = "/tf"
+
+_SECONDS, _NANOSECONDS = -2, -1
+_STAMP = {"sec": _SECONDS, "nsec": _NANOSECONDS}
+"""A message's time: two numbers behind those of its columns."""
 
 _TIME = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
 _XYZ = {"type": "object", "properties": {axis: {"type": "number"} for axis in "xyz"}}
@@ -59,52 +63,6 @@ _TRANSFORMS_SCHEMA = {
         )
     },
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Signal:
-    """One topic of a recording, as arrays.
-
-    Attributes:
-        time: (N,) s, as recorded.
-        names: the columns' names.
-        values: (N, len(names)) in the units that the names state.
-    """
-
-    time: Array
-    names: tuple[str, ...]
-    values: Array
-
-    def column(self, name: str) -> Array:
-        """Return one column.
-
-        Args:
-            name: one of `names`.
-
-        Raises:
-            InputError: there is no such column.
-        """
-        if name not in self.names:
-            raise InputError(f"The signal has no column {name!r}; it has {', '.join(self.names)}.")
-        return self.values[:, self.names.index(name)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RecordingFile:
-    """What a recording holds.
-
-    Attributes:
-        signals: topic to signal; joint states have columns `<joint>:position`, `:velocity`,
-            `:effort`, transforms `<frame>:x` … `:qw`.
-        metadata: seed, versions, outcome and whatever else the run wrote about itself.
-        attachments: files that the run carries along, such as its project file.
-        complete: whether the file was closed; a cut-off file still gives what it holds.
-    """
-
-    signals: Mapping[str, Signal]
-    metadata: Mapping[str, str]
-    attachments: Mapping[str, bytes]
-    complete: bool
 
 
 class _ReservedFile:
@@ -158,13 +116,16 @@ class _ReservedFile:
 @dataclass(slots=True)
 class _Channel:
     identifier: int
+    topic: str
     names: tuple[str, ...]
+    pattern: str
+    columns: list[int]
     count: int = 0
 
 
 @dataclass(slots=True)
 class McapRecorder:
-    """Writes a recording block by block; closing it, even after Ctrl-C, leaves a readable file.
+    """Writes a recording block by block; Ctrl-C meanwhile leaves what was there before.
 
     Use it as a context manager. Each block of rows becomes one message a row. Where there is no
     room for the reserve, a full disk cuts the file off behind its last whole chunk.
@@ -225,7 +186,10 @@ class McapRecorder:
             failure = late
         finally:
             self._file.close()
-            os.replace(self._partial, self.path)
+            if kind is KeyboardInterrupt:
+                self._partial.unlink()
+            else:
+                os.replace(self._partial, self.path)
         if failure is not None:
             raise FileError(
                 f"{self.path} is cut off: {failure.strerror or failure}; "
@@ -264,10 +228,14 @@ class McapRecorder:
             "type": "object",
             "properties": {"timestamp": _TIME, **{name: {"type": "number"} for name in names}},
         }
-        channel = self._channel(topic, f"sealag.{topic.strip('/')}", schema, tuple(names))
-        for stamp, row in self._rows(topic, time, values, len(channel.names)):
-            message = {"timestamp": _stamp(stamp), **dict(zip(channel.names, row, strict=True))}
-            self._add(channel, stamp, message)
+        channel = self._channel(
+            topic,
+            f"sealag.{topic.strip('/')}",
+            schema,
+            names=tuple(names),
+            message={"timestamp": _STAMP, **{name: k for k, name in enumerate(names)}},
+        )
+        self._add(channel, time, values)
 
     def write_joint_states(
         self, time: ArrayLike, position: ArrayLike, velocity: ArrayLike, *, effort: ArrayLike
@@ -286,15 +254,18 @@ class McapRecorder:
         """
         n = len(self.joints)
         parts = [np.atleast_2d(np.asarray(part, float)) for part in (position, velocity, effort)]
+        joints = [
+            {"name": name, "position": k, "velocity": n + k, "effort": 2 * n + k}
+            for k, name in enumerate(self.joints)
+        ]
         channel = self._channel(
-            JOINT_STATES, "foxglove.JointStates", _JOINT_STATES_SCHEMA, self.joints
+            JOINT_STATES,
+            "foxglove.JointStates",
+            _JOINT_STATES_SCHEMA,
+            names=self.joints,
+            message={"timestamp": _STAMP, "joints": joints},
         )
-        for stamp, row in self._rows(JOINT_STATES, time, np.hstack(parts), 3 * n):
-            joints = [
-                {"name": name, "position": row[k], "velocity": row[n + k], "effort": row[2 * n + k]}
-                for k, name in enumerate(self.joints)
-            ]
-            self._add(channel, stamp, {"timestamp": _stamp(stamp), "joints": joints})
+        self._add(channel, time, np.hstack(parts))
 
     def write_transforms(
         self, frames: Sequence[str], time: ArrayLike, poses: ArrayLike, *, parent: str = "world"
@@ -311,154 +282,95 @@ class McapRecorder:
             InputError: the shapes do not fit.
             FileError: the disk is full; what came before is kept.
         """
+        transforms = [
+            {
+                "timestamp": _STAMP,
+                "parent_frame_id": parent,
+                "child_frame_id": frame,
+                "translation": {axis: 7 * k + i for i, axis in enumerate("xyz")},
+                "rotation": {axis: 7 * k + 3 + i for i, axis in enumerate("xyzw")},
+            }
+            for k, frame in enumerate(frames)
+        ]
         channel = self._channel(
-            TRANSFORMS, "foxglove.FrameTransforms", _TRANSFORMS_SCHEMA, tuple(frames)
+            TRANSFORMS,
+            "foxglove.FrameTransforms",
+            _TRANSFORMS_SCHEMA,
+            names=tuple(frames),
+            message={"transforms": transforms},
         )
-        for stamp, row in self._rows(TRANSFORMS, time, poses, 7 * len(frames)):
-            transforms = [
-                {
-                    "timestamp": _stamp(stamp),
-                    "parent_frame_id": parent,
-                    "child_frame_id": frame,
-                    "translation": dict(zip("xyz", row[7 * k : 7 * k + 3], strict=True)),
-                    "rotation": dict(zip("xyzw", row[7 * k + 3 : 7 * k + 7], strict=True)),
-                }
-                for k, frame in enumerate(frames)
-            ]
-            self._add(channel, stamp, {"transforms": transforms})
-
-    def _rows(
-        self, topic: str, time: ArrayLike, values: ArrayLike, width: int
-    ) -> Iterator[tuple[float, list[float]]]:
-        times = np.atleast_1d(np.asarray(time, float))
-        table = np.atleast_2d(np.asarray(values, float))
-        if table.shape != (len(times), width):
-            raise InputError(
-                f"Topic {topic}: values have shape {table.shape}; "
-                f"{len(times)} times and {width} columns need ({len(times)}, {width})."
-            )
-        return zip(times.tolist(), table.tolist(), strict=True)
+        self._add(channel, time, poses)
 
     def _channel(
-        self, topic: str, schema_name: str, schema: dict[str, Any], names: tuple[str, ...]
+        self,
+        topic: str,
+        schema_name: str,
+        schema: dict[str, Any],
+        *,
+        names: tuple[str, ...],
+        message: dict[str, Any],
     ) -> _Channel:
+        """A topic's channel; `message` has the numbers of columns in place of their values."""
         channel = self._channels.get(topic)
         if channel is None:
             schema_id = self._writer.register_schema(
                 name=schema_name, encoding="jsonschema", data=json.dumps(schema).encode()
             )
-            channel = _Channel(
-                self._writer.register_channel(
-                    topic=topic,
-                    message_encoding="json",
-                    schema_id=schema_id,
-                    metadata={"names": json.dumps(names)},
-                ),
-                names,
+            identifier = self._writer.register_channel(
+                topic=topic,
+                message_encoding="json",
+                schema_id=schema_id,
+                metadata={"names": json.dumps(names)},
             )
+            pattern, columns = _pattern(message)
+            channel = _Channel(identifier, topic, names, pattern, columns)
             self._channels[topic] = channel
         if channel.names != names:
             raise InputError(f"Topic {topic} was begun with the columns {channel.names}.")
         return channel
 
-    def _add(self, channel: _Channel, time: float, message: dict[str, Any]) -> None:
-        nanoseconds = round(time * 1e9)
-        self._writer.add_message(
-            channel_id=channel.identifier,
-            log_time=nanoseconds,
-            publish_time=nanoseconds,
-            sequence=channel.count,
-            data=json.dumps(message, separators=(",", ":")).encode(),
-        )
-        channel.count += 1
-        if self._file.full:
-            raise FileError(
-                f"{self.path} stops at {time:.3f} s because the disk is full; "
-                "what was recorded until then is kept."
+    def _add(self, channel: _Channel, time: ArrayLike, values: ArrayLike) -> None:
+        times = np.atleast_1d(np.asarray(time, float))
+        table = np.atleast_2d(np.asarray(values, float))
+        width = len(set(channel.columns) - {_SECONDS, _NANOSECONDS})
+        if table.shape != (len(times), width):
+            raise InputError(
+                f"Topic {channel.topic}: values have shape {table.shape}; "
+                f"{len(times)} times and {width} columns need ({len(times)}, {width})."
             )
+        pick = itemgetter(*channel.columns)
+        for stamp, row in zip(times.tolist(), table.tolist(), strict=True):
+            nanoseconds = round(stamp * 1e9)
+            numbers = json.dumps(row)[1:-1].split(", ")
+            numbers += divmod(nanoseconds, 1_000_000_000)
+            self._writer.add_message(
+                channel_id=channel.identifier,
+                log_time=nanoseconds,
+                publish_time=nanoseconds,
+                sequence=channel.count,
+                data=(channel.pattern % pick(numbers)).encode(),
+            )
+            channel.count += 1
+            if self._file.full:
+                raise FileError(
+                    f"{self.path} stops at {stamp:.3f} s because the disk is full; "
+                    "what was recorded until then is kept."
+                )
 
 
-def _stamp(time: float) -> dict[str, int]:
-    seconds, nanoseconds = divmod(round(time * 1e9), 1_000_000_000)
-    return {"sec": seconds, "nsec": nanoseconds}
-
-
-def read_recording(path: str | Path) -> RecordingFile:
-    """Read a recording back as arrays, also one that was cut off.
-
-    Args:
-        path: an MCAP file that `McapRecorder` wrote.
-
-    Returns:
-        Its signals, metadata and attachments.
-
-    Raises:
-        FileError: the file is missing or is no MCAP file.
-    """
-    from mcap.exceptions import McapError
-    from mcap.records import Attachment, Channel, Footer, Message, Metadata
-    from mcap.stream_reader import StreamReader
-
-    channels: dict[int, Any] = {}
-    rows: dict[int, list[tuple[float, list[float]]]] = {}
-    metadata: dict[str, str] = {}
-    attachments: dict[str, bytes] = {}
-    complete = False
-    try:
-        with open(path, "rb") as file:
-            if file.read(5) != b"\x89MCAP":
-                raise FileError(f"{path} is not an MCAP recording.")
-            file.seek(0)
-            try:
-                for record in StreamReader(file).records:
-                    match record:
-                        case Channel():
-                            channels[record.id] = record
-                        case Message():
-                            row = _row(channels[record.channel_id].topic, record.data)
-                            rows.setdefault(record.channel_id, []).append(
-                                (record.log_time * 1e-9, row)
-                            )
-                        case Metadata():
-                            metadata.update(record.metadata)
-                        case Attachment():
-                            attachments[record.name] = record.data
-                        case Footer():
-                            complete = True
-            except (McapError, struct.error):
-                complete = False
-    except OSError as error:
-        if isinstance(error, FileError):
-            raise
-        raise FileError(f"{path} cannot be read: {error.strerror or error}.") from error
-    signals = {channels[key].topic: _signal(channels[key], found) for key, found in rows.items()}
-    return RecordingFile(
-        signals=signals, metadata=metadata, attachments=attachments, complete=complete
-    )
-
-
-def _row(topic: str, data: bytes) -> list[float]:
-    message = json.loads(data)
-    if topic == JOINT_STATES:
-        return [j[key] for key in ("position", "velocity", "effort") for j in message["joints"]]
-    if topic == TRANSFORMS:
-        return [
-            value
-            for t in message["transforms"]
-            for value in (*t["translation"].values(), *t["rotation"].values())
-        ]
-    return [value for key, value in message.items() if key != "timestamp"]
-
-
-def _signal(channel: Any, found: list[tuple[float, list[float]]]) -> Signal:
-    names = tuple(json.loads(channel.metadata["names"]))
-    if channel.topic == JOINT_STATES:
-        names = tuple(f"{j}:{key}" for key in ("position", "velocity", "effort") for j in names)
-    elif channel.topic == TRANSFORMS:
-        keys = ("x", "y", "z", "qx", "qy", "qz", "qw")
-        names = tuple(f"{frame}:{key}" for frame in names for key in keys)
-    return Signal(
-        time=np.array([time for time, _ in found]),
-        names=names,
-        values=np.array([row for _, row in found], dtype=float),
-    )
+def _pattern(message: Any) -> tuple[str, list[int]]:
+    """JSON with %s in place of the numbers of columns, and these numbers in order."""
+    match message:
+        case int():
+            return "%s", [message]
+        case dict():
+            parts = [_pattern(value) for value in message.values()]
+            names = [_pattern(name)[0] for name in message]
+            texts = [f"{name}:{text}" for name, (text, _) in zip(names, parts, strict=True)]
+            whole = "{" + ",".join(texts) + "}"
+        case list():
+            parts = [_pattern(value) for value in message]
+            whole = "[" + ",".join(text for text, _ in parts) + "]"
+        case _:
+            return json.dumps(message).replace("%", "%%"), []
+    return whole, [column for _, columns in parts for column in columns]

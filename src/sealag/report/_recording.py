@@ -1,5 +1,6 @@
 """A simulated run as an MCAP recording."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,18 @@ from sealag.typing import Array
 _BLOCK = 500
 
 
-def write_run(run: Run, robot: Robot, path: Path, *, project: str, version: str) -> None:
-    """Write a run: joint states, torques, frame poses, contact, energy, works and origin.
+def write_run(
+    run: Run,
+    robot: Robot,
+    path: Path,
+    *,
+    project: str,
+    version: str,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Write a run: joint states, torques, link poses, contact, energy, works and origin.
+
+    How the run ended is written last, so that a recording that a full disk cut off does not say it.
 
     Args:
         run: the run.
@@ -21,6 +32,7 @@ def write_run(run: Run, robot: Robot, path: Path, *, project: str, version: str)
         path: the MCAP file.
         project: text of the project file, attached.
         version: of sealag.
+        progress: called with the time up to which the run is written, s.
 
     Raises:
         FileError: it cannot be written; a full disk leaves what was written readable.
@@ -30,10 +42,8 @@ def write_run(run: Run, robot: Robot, path: Path, *, project: str, version: str)
         "robot": robot.name,
         "urdf_sha256": robot.urdf_sha256,
         "seed": str(run.seed),
-        "outcome": run.outcome.value,
-        "message": run.message,
     }
-    frames = [frame for frame in robot.frame_names() if frame not in ("universe", "root_joint")]
+    frames = robot.link_names()
     attachments = {
         "project.toml": project.encode(),
         robot.urdf_path.name: robot.urdf_path.read_bytes(),
@@ -67,8 +77,10 @@ def write_run(run: Run, robot: Robot, path: Path, *, project: str, version: str)
             for topic, table in tables.items():
                 values = np.column_stack([column[rows] for column in table.values()])
                 recorder.write_signal(topic, list(table), time, values=values)
-            poses = np.array([_poses(robot, frames, q) for q in run.q[rows]])
-            recorder.write_transforms(frames, time, poses)
+            recorder.write_transforms(frames, time, _poses(robot, frames, run.q[rows]))
+            if progress is not None:
+                progress(float(time[-1]))
+        recorder.note("end", {"outcome": run.outcome.value, "message": run.message})
 
 
 def _ages(run: Run) -> dict[str, Array]:
@@ -121,18 +133,14 @@ def _contacts(run: Run) -> dict[str, Array]:
     return columns
 
 
-def _poses(robot: Robot, frames: list[str], q: Array) -> Array:
-    """Position and quaternion of each frame, one behind the other."""
-    row = []
-    at = robot.workspace_at(q)
-    for frame in frames:
-        rotation, position = at.frame_placement(frame)
-        row += [*position, *_quaternion(rotation)]
-    return np.array(row)
-
-
-def _quaternion(R: Array) -> Array:
-    """x, y, z, w of a rotation matrix."""
+def _poses(robot: Robot, frames: Sequence[str], q: Array) -> Array:
+    """Position and quaternion (N, 7 k) of each frame, one behind the other."""
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_matrix(R).as_quat()
+    turns, places = np.zeros((len(q), len(frames), 3, 3)), np.zeros((len(q), len(frames), 3))
+    for row, configuration in enumerate(q):
+        at = robot.workspace_at(configuration)
+        for k, frame in enumerate(frames):
+            turns[row, k], places[row, k] = at.frame_placement(frame)
+    quaternions = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat()
+    return np.dstack([places, quaternions.reshape(*places.shape[:2], 4)]).reshape(len(q), -1)

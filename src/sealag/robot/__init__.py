@@ -2,6 +2,7 @@
 
 from sealag.robot._contact import Contact, ContactKind, Motion
 from sealag.robot._load import bundled_robot_path, example_robot_path, resolve_urdf
+from sealag.robot._reference import ReferencePosture, reference_posture
 from sealag.robot._robot import Robot, load_robot
 from sealag.robot._stack import Stack, TermRows, stack_terms
 from sealag.robot._workspace import Workspace
@@ -10,6 +11,7 @@ __all__ = [
     "Contact",
     "ContactKind",
     "Motion",
+    "ReferencePosture",
     "Robot",
     "Stack",
     "TermRows",
@@ -17,6 +19,7 @@ __all__ = [
     "bundled_robot_path",
     "example_robot_path",
     "load_robot",
+    "reference_posture",
     "resolve_urdf",
     "stack_terms",
 ]

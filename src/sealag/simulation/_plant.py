@@ -156,8 +156,10 @@ class Plant:
         if fastest * self.step_length > _STABLE:
             joint = self.robot.joints[int(np.abs(modes[:, -1]).argmax())]
             raise InputError(
-                f"the physics step {self.step_length:g} s is too long: the link of {joint} swings "
-                f"on its spring at {fastest:.0f} rad/s; use at most {0.5 * _STABLE / fastest:.1g} s"
+                f"the physics step of {self.step_length * 1e3:g} ms is too long: the link of "
+                f"{joint} swings on its spring at {fastest:.0f} rad/s; use at most "
+                f"{0.5e3 * _STABLE / fastest:.1g} ms (simulation.physics_step_ms), "
+                "or is the spring too stiff for the link's inertia?"
             )
 
     @property

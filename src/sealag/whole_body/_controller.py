@@ -144,8 +144,8 @@ class Controller:
 
         Raises:
             RobotError: the mass matrix is not positive definite.
-            ContractionError: q̄(θ) is fed back and does not exist: the task is stiffer than the
-                springs.
+            ContractionError: q̄(θ) is fed back and does not exist, since the task is stiffer than
+                the springs, or is not found, since the reference is out of reach.
         """
         rate = self._refer(t)
         match self.options.feedback:
@@ -271,14 +271,23 @@ class Controller:
             )
             size = float(np.abs(step).max())
             if not (exists and size < _LOST):
-                raise ContractionError(
-                    "q̄(θ) does not exist: the task is stiffer than the springs "
-                    f"(contraction factor {self.contraction:.2f}; below 1 is needed)."
-                )
+                raise self._without_static_state(size)
             if size < _SETTLED:
                 break
         out[:] = -K * sag
         self._error -= space.J_star @ step
+
+    def _without_static_state(self, step: float) -> ContractionError:
+        if self.contraction >= 1.0:
+            return ContractionError(
+                "q̄(θ) does not exist: the task is stiffer than the springs "
+                f"(contraction factor {self.contraction:.2f}; below 1 is needed)."
+            )
+        return ContractionError(
+            f"q̄(θ) is not found: Newton's step towards it is {step:.2g} rad. The springs can hold "
+            f"the task's stiffness (contraction factor {self.contraction:.2f}), but its error is "
+            "out of reach: is the reference too far away?"
+        )
 
     def _gravity_of_motors(self, measurement: Measurement) -> None:
         """With the tank, compensation that is fed back is taken at θ, whose gradient it has."""

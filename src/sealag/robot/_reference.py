@@ -1,0 +1,68 @@
+"""Postures that a robot's maker names: the group states of an SRDF beside the URDF."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+from sealag.robot._robot import Robot
+
+_NAMES = ("standing", "half_sitting", "homing", "home", "default", "neutral")
+
+
+class ReferencePosture(NamedTuple):
+    """A posture that a file beside the URDF names.
+
+    Attributes:
+        name: what it is called there.
+        file: the SRDF.
+        joints: joint name to position, rad or m.
+    """
+
+    name: str
+    file: Path
+    joints: dict[str, float]
+
+
+def reference_posture(robot: Robot) -> ReferencePosture | None:
+    """Find a posture in an SRDF in the URDF's folder, or in the folder `srdf` there or beside it.
+
+    The file with the URDF's own name goes first, and a posture to stand in before others.
+
+    Args:
+        robot: whose posture is wanted; one that names fewer than half of its joints is another's.
+
+    Returns:
+        The posture; None if there is none.
+    """
+    folder, stem = robot.urdf_path.resolve().parent, robot.urdf_path.stem
+    places = (folder, folder / "srdf", folder.parent / "srdf")
+    files = [path for place in places for path in sorted(place.glob("*.srdf"))]
+    found = [
+        state
+        for path in sorted(files, key=lambda path: path.stem != stem)
+        for state in _states(path)
+        if 2 * len(state.joints.keys() & set(robot.joints)) >= robot.n
+    ]
+    for wanted in _NAMES:
+        for state in found:
+            if state.name.startswith(wanted):
+                known = {name: state.joints.get(name, 0.0) for name in robot.joints}
+                return state._replace(joints=known)
+    return None
+
+
+def _states(path: Path) -> Iterator[ReferencePosture]:
+    """Postures of one file; what is no number, as the pose of the base, is left out."""
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError):
+        return
+    for state in root.iterfind("group_state"):
+        joints = {}
+        for joint in state.iterfind("joint"):
+            try:
+                joints[joint.get("name", "")] = float(joint.get("value", ""))
+            except ValueError:
+                continue
+        yield ReferencePosture(state.get("name", ""), path, joints)
