@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.exceptions import TyperException
 
 from sealag.errors import SealagError
+
+INTERRUPTED = 130
+"""Exit status with which Typer answers Ctrl-C."""
 
 app = typer.Typer(
     name="sealag",
     help="How much network delay a robot with springs in its joints tolerates.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -178,14 +181,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
         arguments: what follows the program's name; the process's own if None.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        app(args=None if arguments is None else list(arguments), prog_name="sealag")
+        status = app(args=words, prog_name="sealag", standalone_mode=False)
     except SealagError as error:
-        print(f"sealag: {error}", file=sys.stderr)
+        line = str(error).replace("\n", "\\n")
+        print(f"sealag: {line}", file=sys.stderr)
         raise SystemExit(2) from None
-    except KeyboardInterrupt:
-        print("sealag: interrupted", file=sys.stderr)
-        raise SystemExit(130) from None
+    except TyperException as error:
+        known = {
+            command.callback.__name__ for command in app.registered_commands if command.callback
+        }
+        asked = f"{words[0]} " if words[0] in known else ""
+        problem = error.format_message().rstrip(".")
+        print(f"sealag: {problem}; see sealag {asked}--help.", file=sys.stderr)
+        raise SystemExit(2) from None
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(0) from None
+    if status == INTERRUPTED:
+        print("sealag: interrupted", file=sys.stderr)
+    raise SystemExit(status or 0)

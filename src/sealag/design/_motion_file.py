@@ -2,6 +2,7 @@
 
 import csv
 import io
+import zipfile
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -84,7 +85,7 @@ def _check_rows(table: dict[str, Array], path: Path) -> None:
         bad, need = ~np.isfinite(column), "a finite number"
         if name == "time_s":
             bad[1:] |= np.diff(column) <= 0.0
-            need = "more than in the row before"
+            need = "more than in the row before: time must increase"
         elif name.startswith(CONTACT):
             bad, need = (column != 0.0) & (column != 1.0), "0 or 1"
         if bad.any():
@@ -141,9 +142,9 @@ def _column(values: Array, name: str, path: Path) -> Array:
 
 
 def _read_npz(content: bytes, path: Path) -> dict[str, Array]:
+    if not zipfile.is_zipfile(io.BytesIO(content)):
+        raise MotionError(f"{path} is not an NPZ file of named columns; np.savez writes one.")
     data = np.load(io.BytesIO(content), allow_pickle=False)
-    if not isinstance(data, np.lib.npyio.NpzFile):
-        raise MotionError(f"{path} holds one array without a name; np.savez writes named ones.")
     return {name: data[name] for name in data}
 
 
@@ -158,11 +159,13 @@ def _read_parquet(content: bytes, path: Path) -> dict[str, Array]:
 def _read_csv(content: bytes, path: Path) -> dict[str, Array]:
     lines = csv.reader(content.decode("utf-8-sig").splitlines(), strict=True)
     names = [name.strip() for name in next(lines, [])]
+    if not names or _number(names[0]) is not None:
+        raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
+    if ";" in names[0]:
+        raise MotionError(f"{path} has semicolons between its cells; commas are right.")
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise MotionError(f"{path}: the column name {twice[0]!r} occurs twice.")
-    if not names or _number(names[0]) is not None:
-        raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
     rows: list[list[float]] = []
     for cells in lines:
         if not cells:

@@ -72,5 +72,5 @@ def _key(place: tuple[Any, ...], data: Any) -> str:
         elif isinstance(at, list) and isinstance(part, int):
             at = at[part]
             name = at.get("name", at.get("frame")) if isinstance(at, dict) else None
-            key = f"{key}[{part + 1 if name is None else name!r}]"
+            key += f" (entry {part + 1})" if name is None else f"[{name!r}]"
     return key.removeprefix(".")

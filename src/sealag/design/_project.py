@@ -22,7 +22,7 @@ from sealag.delay import (
     measured,
 )
 from sealag.design._plain_words import first_problem
-from sealag.design._schema import Project
+from sealag.design._schema import Project, SamplesDelay
 from sealag.design._system import System, Tank
 from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
@@ -125,16 +125,14 @@ def parse_project(content: bytes, path: Path) -> Any:
 
 @contextmanager
 def _named(path: Path, key: str) -> Iterator[None]:
-    """Let errors name the project file and the key that they come from."""
-    where = f"{path}: {key}: " if key else f"{path}: "
+    """Let errors name the project file and the key that they come from, unless they do so."""
     try:
         yield
-    except FileError as error:
-        raise FileError(f"{where}{error}") from error
-    except ProjectError:
-        raise
     except SealagError as error:
-        raise ProjectError(f"{where}{error}") from error
+        if str(error).startswith(f"{path}: "):
+            raise
+        kind = FileError if isinstance(error, FileError) else ProjectError
+        raise kind(f"{path}: {key}{': ' if key else ''}{error}") from error
 
 
 def _system(project: Any, path: Path, text: str) -> System:
@@ -151,6 +149,11 @@ def _system(project: Any, path: Path, text: str) -> System:
         task_inertia=TaskInertia(project.controller.task_inertia),
     )
     hierarchy.gain(robot)
+    motion_file = folder / project.motion.file if project.motion else None
+    if motion_file and not motion_file.is_file():
+        raise FileError(f"{path}: motion.file is {project.motion.file!r}; there is no such file.")
+    samples = [keys.file for _, keys in project.delays if isinstance(keys, SamplesDelay)]
+    files = [path, robot.urdf_path, motion_file, *(folder / name for name in samples)]
     return System(
         name=path.stem,
         robot=robot,
@@ -168,19 +171,20 @@ def _system(project: Any, path: Path, text: str) -> System:
         ),
         criterion=Criterion(project.controller.criterion),
         delays=_delays(project.delays, folder, path),
-        motion_file=folder / project.motion.file if project.motion else None,
+        motion_file=motion_file,
         sha256=hashlib.sha256(text.encode()).hexdigest(),
         simulation=project.simulation,
         walking=walking_of(project.walking, robot),
         text=text,
+        files=tuple(file for file in files if file is not None),
     )
 
 
 def _contacts(sections: Any, robot: Robot, path: Path) -> tuple[Contact, ...]:
     if sections and not robot.floating_base:
         raise ProjectError(
-            f'{path}: robot.base is "fixed", but [[contacts]] hold frames to the ground too; remove '
-            'them, or let the base be "floating".'
+            f'{path}: robot.base is "fixed", but [[contacts]] hold frames to the ground as well; '
+            'remove them, or let the base be "floating".'
         )
     frames = [robot.check_frame(section.frame) for section in sections]
     for frame in frames:
@@ -265,21 +269,22 @@ def _delays(section: Any, folder: Path, path: Path) -> Delays:
 
 def _connection(section: Any, name: str, folder: Path, path: Path) -> RoundTrip:
     """A connection from its round trip, or from both of its ways."""
-    whole, up, down = (getattr(section, f"{name}_{way}") for way in ("round_trip", "up", "down"))
-    if whole is not None and up is None and down is None:
-        return RoundTrip.halved(_signal(whole, folder), **_packets(whole))
-    if whole is None and up is not None and down is not None:
-        return RoundTrip(
-            **{
-                way: Link(delay=_signal(keys, folder), **_packets(keys))
-                for way, keys in (("up", up), ("down", down))
-            }
+    sections = {way: getattr(section, f"{name}_{way}") for way in ("round_trip", "up", "down")}
+    given = {way for way, keys in sections.items() if keys is not None}
+    if given not in ({"round_trip"}, {"up", "down"}):
+        said = "given besides one of its ways" if "round_trip" in given else "missing"
+        raise ProjectError(
+            f"{path}: the key delays.{name}_round_trip is {said}; give it alone, or both {name}_up "
+            f"and {name}_down."
         )
-    said = "missing" if whole is None else "given besides one of its ways"
-    raise ProjectError(
-        f"{path}: the key delays.{name}_round_trip is {said}; give it alone, or both {name}_up and "
-        f"{name}_down."
-    )
+    links = {}
+    for way in given:
+        with _named(path, f"delays.{name}_{way}"):
+            links[way] = Link(delay=_signal(sections[way], folder), **_packets(sections[way]))
+    if "round_trip" not in links:
+        return RoundTrip(**links)
+    whole = sections["round_trip"]
+    return RoundTrip.halved(links["round_trip"].delay, **_packets(whole))
 
 
 def _packets(keys: Any) -> dict[str, Any]:
@@ -313,19 +318,13 @@ def _samples(section: Any, folder: Path) -> DelaySignal:
     path = folder / section.file
     content = read_whole(path, what="The delay samples", largest=LARGEST_SAMPLES_BYTES)
     values = []
-    try:
-        for row, line in enumerate(content.decode("utf-8-sig").splitlines(), start=1):
-            if line.strip():
-                values.append(float(line))
-    except ValueError as error:
-        if isinstance(error, UnicodeDecodeError):
-            raise ProjectError(f"{path} is not text: {error}.") from error
-        raise ProjectError(
-            f"{path}: line {row} is {line.strip()[:60]!r}; one number, a delay in ms, is needed."
-        ) from error
+    for row, line in enumerate(content.decode("utf-8-sig", "replace").splitlines(), start=1):
+        try:
+            values += [float(line)] if line.strip() else []
+        except ValueError as error:
+            raise ProjectError(
+                f"{path}: line {row} is {line.strip()[:60]!r}; one number, a delay in ms, is right."
+            ) from error
     if not values:
         raise ProjectError(f"{path} is empty; one delay in ms a line is needed.")
-    with _named(path, "delays in ms"):
-        return measured(
-            np.array(values) * 1e-3, period=section.period_s, quantile=section.quantile
-        )
+    return measured(np.array(values) * 1e-3, period=section.period_s, quantile=section.quantile)

@@ -131,7 +131,9 @@ def read_model(path: Path, *, floating_base: bool) -> tuple[Any, dict[str, str],
 def _check_description(root: ElementTree.Element, path: Path) -> None:
     """Refuse what the parser would accept, or refuse without saying why."""
     if any("xacro" in element.tag for element in root.iter()):
-        raise RobotError(f"{path} is a xacro file; expand it first: xacro {path.name} > robot.urdf.")
+        raise RobotError(
+            f"{path} is a xacro file; expand it first: xacro {path.name} > robot.urdf."
+        )
     if root.tag != "robot" or root.find("link") is None:
         raise RobotError(f"{path} is not a URDF: it needs a <robot> with at least one <link>.")
     if root.find("joint") is None:
@@ -140,14 +142,14 @@ def _check_description(root: ElementTree.Element, path: Path) -> None:
         name, limit, axis = joint.get("name", ""), joint.find("limit"), joint.find("axis")
         if name in ("", _ROOT):
             raise RobotError(f"{path}: a joint is called {name!r}; give it another name.")
-        lower, upper = ((limit.get(key, "0") if limit is not None else "0") for key in _ENDS)
+        lower, upper = (limit.get(key, "0") if limit is not None else "0" for key in _ENDS)
         if _number(lower) > _number(upper):
             raise RobotError(
-                f"{path}: the limits of joint {name} are {lower} … {upper}; the lower one must come "
-                "first."
+                f"{path}: the limits of joint {name} are {lower} … {upper}; the lower one must "
+                "come first."
             )
-        moves = joint.get("type") != "fixed" and axis is not None
-        if moves and not any(map(_number, axis.get("xyz", "1 0 0").split())):
+        ways = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
+        if joint.get("type") != "fixed" and not any(map(_number, ways.split())):
             raise RobotError(f"{path}: the axis of joint {name} is zero; it needs a direction.")
 
 
@@ -216,11 +218,13 @@ def check_inertias(model: Any, path: Path) -> None:
     values, vectors = np.linalg.eigh(M / np.outer(size, size))
     weak = (own < _LEAST_INERTIA) | ((values[0] < _SINGULAR) & (np.abs(vectors[:, 0]) > 0.3))
     if weak.any():
-        moved = [k for k, j in enumerate(model.joints) if k and weak[j.idx_v : j.idx_v + j.nv].any()]
+        moved = [
+            k for k, j in enumerate(model.joints) if k and weak[j.idx_v : j.idx_v + j.nv].any()
+        ]
         names = ", ".join(f"{links.get(k, '?')} (joint {model.names[k]})" for k in moved)
         raise RobotError(
-            f"{path} gives almost no inertia to what moves at {names}; correct <inertial> there, or "
-            "leave the joint out of robot.actuated."
+            f"{path} gives almost no inertia to what moves at {names}; correct <inertial> there, "
+            "or leave the joint out of robot.actuated."
         )
 
 

@@ -108,12 +108,12 @@ class Task:
         """
         object.__setattr__(self, "kind", TaskKind(self.kind))
         if self.kind in _NEEDS_FRAME and not self.frame:
-            raise InputError(f"Task {self.name}: a {self.kind} task needs a frame.")
+            raise InputError(f"Task {self.name}: its kind, {self.kind}, needs a frame.")
         for key, kinds in _ONLY.items():
             if getattr(self, key) and self.kind not in kinds:
                 raise InputError(
-                    f"Task {self.name}: a {self.kind} task has no {key}; remove the key, or is it "
-                    f"{either(sorted(kinds))}?"
+                    f"Task {self.name}: its kind, {self.kind}, has no {key}; remove the key, or "
+                    f"should it be {either(sorted(kinds))}?"
                 )
         if len(set(self.axes)) < len(self.axes) or len(set(self.joints)) < len(self.joints):
             raise InputError(f"Task {self.name}: an axis or joint is listed twice; once is right.")
