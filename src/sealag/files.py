@@ -57,6 +57,21 @@ def check_output(path: Path, *inputs: Path) -> None:
             raise FileError(f"{path} would be overwritten, but it is read; choose another --out.")
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder with those above it, if it is not there.
+
+    Args:
+        path: the folder.
+
+    Raises:
+        FileError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"The folder {path} cannot be made: {error.strerror or error}.") from error
+
+
 @contextmanager
 def written_whole(path: Path) -> Iterator[BinaryIO]:
     """Open a file for writing that appears under its name only once it is complete.

@@ -10,7 +10,7 @@ import numpy as np
 from sealag.cli._app import show_json
 from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
 from sealag.errors import FileError, InputError
-from sealag.files import check_output, write_text
+from sealag.files import check_output, make_folder, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms
@@ -171,6 +171,7 @@ def write_paper(out: Path, *, as_json: bool) -> None:
     """Compute and write the paper page."""
     from sealag.cli._paper import make_paper
 
+    make_folder(out)
     answer = make_paper(out, progress=lambda text: print(text, file=sys.stderr, flush=True))
     if as_json:
         show_json(answer)

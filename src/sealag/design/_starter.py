@@ -12,7 +12,7 @@ _HEAD = """\
 [robot]
 urdf = "{urdf}"
 base = "{base}"          # "floating" or "fixed"
-actuated = [             # joints with an actuator; others, and those that mimic one, are locked at 0
+actuated = [             # joints with an actuator; others are locked at 0, mimics too
 {actuated}
 ]
 
