@@ -80,7 +80,8 @@ CHANGES = {
     "axis twice": ('kind = "com"', 'kind = "com"\naxes = ["x", "x"]', ["centre of mass", "twice"]),
     "endless burst": (SINUSOID, 'central_round_trip = { kind = "constant", value_ms = 1.0, '
         "packet_loss = 0.1, max_burst = 1000000000 }\nsample_time_ms = 1.0", ["max_burst", "5 s"]),
-    "no samples": (SINUSOID, 'central_round_trip = {kind = "samples", period_s = 1, file = "no.txt"}',
+    "no samples": (SINUSOID,
+        'central_round_trip = {kind = "samples", period_s = 1, file = "no.txt"}',
         ["central_round_trip", "no.txt"]),
     "no motion": ("[delays]", '[motion]\nfile = "no.csv"\n[delays]', ["motion.file", "no.csv"]),
     "folder for URDF": ("bundled:hume.urdf", ".", ["robot", "Is a directory"]),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import sealag
+from sealag.design import System
 from sealag.errors import CertificateError
 from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.passivity import content_digest, read_certificate, verify, write_certificate
@@ -54,18 +55,22 @@ def made(name: str) -> dict[str, Any]:
     return copy.deepcopy(_made(name))
 
 
-def _moving() -> Any:
-    system = sealag.load("bundled:hume")
+def half_a_step(system: System) -> Motion:
+    """Forty instants of Hume's walk."""
     whole = walk_motion(system.robot, plan_walk(paper_terrain(), steps=2), rate=100.0)
     part = slice(0, 40)
-    motion = Motion(
+    return Motion(
         time=whole.time[part],
         q=whole.q[part],
         v=whole.v[part],
         contact_sets=whole.contact_sets,
         contact_index=whole.contact_index[part],
     )
-    return sealag.certify(system, motion, time_varying=True)
+
+
+def _moving() -> Any:
+    system = sealag.load("bundled:hume")
+    return sealag.certify(system, half_a_step(system), time_varying=True)
 
 
 def without_loop(data: dict[str, Any]) -> dict[str, Any]:

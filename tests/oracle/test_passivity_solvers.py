@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from helpers.solvers import LIES, Lying
 from sealag.errors import InputError
 from sealag.passivity import (
     ClarabelCvxpy,
@@ -69,36 +70,6 @@ def test_open_corollary_is_closed_from_both_sides(seed):
     assert other == pytest.approx(proven, rel=1e-8)
     whole = max_delay_from_stiffness(parts.sum(axis=0), np.ones(3))
     assert refuted < 0.999 * whole.delay, "the upper end alone must fail here"
-
-
-class Lying:
-    """Says `Solved` whatever it returns."""
-
-    name = "a liar"
-
-    def __init__(self, change):
-        self.change = change
-
-    def solve(self, problem):
-        true = ClarabelDirect().solve(problem)
-        W, P = self.change(true.W, true.P)
-        return Solution(W=W, P=P, status="Solved")
-
-
-LIES = {
-    "too large": lambda W, P: (3.0 * W, P),
-    "too small": lambda W, P: (0.1 * W, P),
-    "not positive": lambda W, P: (-W, -P),
-    "not a number": lambda W, P: (np.nan * W, np.nan * P),
-    "nothing": lambda W, P: (None, None),
-    "zero": lambda W, P: (0.0 * W, 0.0 * P),
-    "wrong shape": lambda W, P: (W[:1], P[..., :1]),
-    "noise": lambda W, P: (
-        W + 0.3 * np.linalg.norm(W) * np.random.default_rng(0).normal(size=W.shape),
-        P + 0.3 * np.linalg.norm(P) * np.random.default_rng(1).normal(size=P.shape),
-    ),
-    "infinite": lambda W, P: (np.inf * np.ones_like(W), P),
-}
 
 
 @pytest.mark.parametrize("lie", LIES)

@@ -1,9 +1,13 @@
 """The page is self-contained and says what was computed."""
 
 import re
+import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from sealag.design import certify, load
 from sealag.locomotion import paper_terrain, plan_walk, walk_motion
@@ -47,12 +51,16 @@ class Links(HTMLParser):
                 self.outside.append(target)
 
 
-def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A page from small computations, and what went into it."""
+    out = tmp_path_factory.mktemp("page")
     system = load("bundled:hume")
     motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=20.0)
     figure = figure_4(system.robot, motion, system=system)
     walk = simulate_walk(system, WalkCase(steps=2))
     rows = walk_success({"default": WalkCase(steps=1)}, [paper_terrain()])
+    printed = replace(rows[0], name="published law", walked=0, mean_steps=1.25)
     table = random_plant_table(30)
     delays = delay_map(motion, stiffnesses=[350.0], scales=[1.0, 6.0], terrains=1)
     everywhere = AblationTable(
@@ -62,18 +70,27 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
     certificate = certify(system, motion, time_varying=True)
     traces = figure_5(betas=[0.5], jobs=2)
     extra = [
-        walk_section(system.robot, walk, rows, rows),
-        means_section(rows, everywhere, rows),
+        walk_section(system, walk, rows, rows),
+        means_section(system, walk, [*rows, printed], everywhere, rows),
         energy_section(walk, certificate),
         limits_section(figure, figure, rows, delays),
         figure_5_section(traces, system.robot.joints),
         beyond_section(rows, certificate),
     ]
     page = write_paper_page(
-        tmp_path, figure, figure_4_claims(figure, table), unsafe=unsafe_examples(draws=10),
-        table=table, extra=extra, version="test",
+        out, figure, figure_4_claims(figure, table), unsafe=unsafe_examples(draws=10),
+        table=table, simulated=figure, traces=traces, extra=extra, version="test",
     )  # fmt: skip
-    text = page.read_text()
+    return SimpleNamespace(
+        page=page, figure=figure, delays=delays, certificate=certificate, walk=walk, traces=traces,
+        instants=len(motion),
+    )  # fmt: skip
+
+
+def test_page_needs_no_network_and_holds_the_numbers(written):
+    figure, delays, certificate = written.figure, written.delays, written.certificate
+    walk, traces, out = written.walk, written.traces, written.page.parent
+    text = written.page.read_text()
     links = Links()
     links.feed(text)
     assert links.outside == []
@@ -92,9 +109,45 @@ def test_page_needs_no_network_and_holds_the_numbers(tmp_path):
     assert f"{walk.run.audit.closure:.1e}" in text
     assert delays.walked.tolist() == [[1, 0]]  # the paper's delays, and six times as long ones
     assert f"{figure.delay_s[1][3] * 1e3:.1f}" in text
-    csv = np.genfromtxt(tmp_path / "figure4.csv", delimiter=",", names=True)
+    assert "published law: 0 of 1 walk, 1.2 steps in the mean" in text
+    assert "T_H of 20 ms in the mean and 30 ms at most" in text
+    tables = {path.stem: path.read_text() for path in (out / "tables").iterdir()}
+    assert text.count("<table") == len(tables)
+    assert "no lead,4 / 1,3 / 1,2 / 0" in tables["means_2"]
+    torques = np.genfromtxt(out / "figure5.csv", delimiter=",", names=True)
+    expected = traces[-1].achieved[::2][-1, 0]
+    assert torques[f"spring_{walk.run.joints[0]}_nm"][-1] == pytest.approx(expected, rel=1e-8)
+    csv = np.genfromtxt(out / "figure4.csv", delimiter=",", names=True)
     np.testing.assert_allclose(csv["one_leg_delay_s_D10"], figure.delay_s[1], rtol=1e-8)
-    assert len((tmp_path / "figure4_instants.csv").read_text().splitlines()) == len(motion) + 1
+    assert len((out / "figure4_instants.csv").read_text().splitlines()) == written.instants + 1
+
+
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; .ci/run installs one")
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)], ids=["desktop", "phone"])
+def test_page_in_a_browser(written, width, height):
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        browser = play.chromium.launch(
+            executable_path=BROWSER, args=["--no-sandbox", "--disable-background-networking"]
+        )
+        page = browser.new_page(viewport={"width": width, "height": height})
+        problems = []
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
+        page.goto(written.page.as_uri())
+        picture = "document.querySelector('canvas').toDataURL()"
+        first = page.evaluate(picture)
+        page.wait_for_function(f"{picture} !== '{first}'", timeout=10_000)  # the walk is playing
+        assert problems == []
+        overflow = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        assert page.evaluate(overflow) <= 0
+        page.evaluate("document.querySelector('h1').style.width = '200vw'")
+        assert page.evaluate(overflow) > 0  # and a page that is too wide is noticed
+        browser.close()
 
 
 def test_the_longest_delay_ends_at_the_first_fall():

@@ -39,25 +39,14 @@ class TestManifold:
             np.testing.assert_allclose(J @ out, v, atol=tolerance)
 
 
-def test_frames_are_pinocchio_s(hume):
-    """Jacobian, place and J̇ v of every frame, from the joints' terms alone."""
-    rng = np.random.default_rng(2)
-    q, v = (
-        pin.randomConfiguration(hume._model, np.full(13, -1.0), np.full(13, 1.0)),
-        rng.normal(size=12),
-    )
-    names, at = hume.frame_names(), hume.workspace()
-    at.update(q, v)
-    count = len(names)
-    J, R, p, bias = (np.full((count, *s), np.nan) for s in ((6, 12), (3, 3), (3,), (6,)))
-    rigid.frames(at.terms, hume.frame_mounts(names), J, R, p, bias)
-    for f, name in enumerate(names):
-        rotation, position = at.frame_placement(name)
-        for got, wanted in (
-            (J[f], at.frame_jacobian(name)), (R[f], rotation), (p[f], position),
-            (bias[f], at.frame_bias(name)),
-        ):  # fmt: skip
-            np.testing.assert_allclose(got, wanted, atol=1e-13)
+def test_a_measurement_row():
+    """Time, q, v, motor angles and speeds, spring torques and loaded feet lie where they belong."""
+    sizes = (8, 7, 1, 3, 3, 2, 2)
+    data = np.arange(1.0, 1.0 + contact.memory_size(sizes))
+    row = np.full(1 + 8 + 7 + 3 + 2, np.nan)
+    contact.sense(data, sizes, np.array([0, 1, 0]), np.array([0, 0, 1]), 0.5, row)
+    q, v, z, _, _, tau, *_ = contact.parts(data, sizes)
+    np.testing.assert_array_equal(row, np.concatenate([[0.5], q, v, z[0, :2], tau, [1.0, 0.0]]))
 
 
 def _instant(hume, q, v):

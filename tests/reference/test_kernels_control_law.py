@@ -1,13 +1,22 @@
 """The compiled parts of a controller's tick against plain NumPy and SciPy twins."""
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sealag.kernels.control_law import frame_error, leave_to_higher, static_step
-from sealag.kernels.operational_space import SYMMETRIC, allocate, operational_space
+from sealag.kernels.control_law import frame_error, law, leave_to_higher, static_step
+from sealag.kernels.operational_space import SYMMETRIC, allocate, memory_size, operational_space
+from sealag.robot import Contact, load_robot
+from sealag.whole_body import Hierarchy, Task, TaskKind
+from sealag.whole_body._task_reader import read_tasks
+
+CONTACTS = (Contact(frame="left_foot"), Contact(frame="right_foot"))
+GAINS = np.array([100.0, 120.0, 90.0, 60.0, 50.0, 40.0, 30.0])
+LEVELS = np.array([0, 6, 7])
+WANTED = SimpleNamespace()
 
 
 def turned(axis, angle):
@@ -19,7 +28,7 @@ def turned(axis, angle):
 def test_frame_error_is_the_rotation_vector_up_to_half_a_turn(axis, angle):
     R = turned((0.3, 0.2, -0.5), 1.1)
     wanted, out = turned(axis, angle) @ R, np.zeros(6)
-    frame_error(wanted, np.array([1.0, 2.0, 3.0]), np.asfortranarray(R), np.ones(3), out)
+    frame_error(wanted, np.array([1.0, 2.0, 3.0]), R, np.ones(3), out)
     np.testing.assert_allclose(out[:3], [0.0, 1.0, 2.0], atol=1e-15)
     back = Rotation.from_rotvec(out[3:]).as_matrix()
     np.testing.assert_allclose(back @ R, wanted, atol=2e-8 if angle > 3.0 else 1e-12)
@@ -94,3 +103,60 @@ def test_static_step_refuses_exactly_where_the_fixed_point_is_no_contraction(see
             J, S * (share / factor), K, np.zeros(5), np.zeros(5), np.zeros((5, 5)), np.zeros(5)
         )
         assert exists == (share < 1.0)
+
+
+def plain_law(robot, q, joints, along, offset):
+    """J*ᵀ S x̃ + g of CoM, torso orientation and one joint, at the moved configuration."""
+    there = robot.integrate(q, along @ (joints - q[-6:]))
+    J_s = robot.contact_jacobian(CONTACTS, there)
+    turn = robot.frame_jacobian("torso", there)[3:]
+    J_t = np.vstack([robot.com_jacobian(there), turn, np.eye(12)[[8]]])
+    space, m = allocate(12, 6, 6, m=7), 7
+    assert operational_space(
+        robot.mass_matrix(there), robot.gravity(there), J_s, J_t, np.diag(GAINS), LEVELS, SYMMETRIC,
+        False, 1e-9, space,
+    )  # fmt: skip
+    error = np.zeros(m)
+    error[:3] = WANTED.com - robot.center_of_mass(there)
+    turned_by = WANTED.rotation @ robot.frame_placement("torso", there)[0].T
+    error[3:6] = Rotation.from_matrix(turned_by).as_rotvec()
+    error[6] = WANTED.joint - there[-4]
+    error += offset
+    leave_to_higher(J_t, space.lift, LEVELS, error, np.zeros(12))
+    return space.J_star.T @ space.stiffness @ error + space.gravity, error
+
+
+def test_law_is_its_parts_one_after_the_other():
+    """The whole tick in one call equals frames, tasks, space and torque taken one by one."""
+    robot, rng = load_robot("bundled:hume.urdf", floating_base=True), np.random.default_rng(4)
+    posture = robot.configuration(np.deg2rad([2, -25, 55, -1, -30, 50]))
+    WANTED.com, WANTED.joint = robot.center_of_mass(posture), posture[-4]
+    WANTED.rotation = robot.frame_placement("torso", posture)[0]
+    hierarchy = Hierarchy(
+        tasks=(
+            Task(name="com", kind=TaskKind.COM, stiffness=GAINS[:3]),
+            Task(name="turn", kind=TaskKind.ORIENTATION, frame="torso", stiffness=GAINS[3:6]),
+            Task(
+                name="knee", kind=TaskKind.POSTURE, joints=(robot.joints[2],), priority=2,
+                stiffness=GAINS[6:],
+            ),
+        )
+    )  # fmt: skip
+    frames, tasks = read_tasks(robot, hierarchy, CONTACTS, posture=posture)
+    q, offset = robot.integrate(posture, 0.05 * rng.normal(size=12)), 0.01 * rng.normal(size=7)
+    joints, along = q[-6:] + 0.02 * rng.normal(size=6), rng.normal(size=(12, 6))
+    count, sizes, out = len(frames), (12, 6, 6, 7), np.zeros(6)
+    seen = (
+        *robot.frame_mounts(frames),
+        *(np.zeros((count, *shape)) for shape in ((6, 12), (3, 3), (3,), (6,))),
+    )
+    error = np.zeros(7)
+    assert law(
+        robot.tree, robot.workspace().terms, seen, tasks,
+        (np.diag(GAINS), np.zeros(6), SYMMETRIC, False, 1e-9, True, True),
+        (q, joints, along, offset), (np.zeros((6, 12)), np.zeros((7, 12)), error, np.zeros(7), out),
+        np.zeros(memory_size(*sizes)), sizes,
+    )  # fmt: skip
+    torque, left = plain_law(robot, q, joints, along, offset)
+    np.testing.assert_allclose(error, left, atol=1e-11)
+    np.testing.assert_allclose(out, torque, rtol=1e-9, atol=1e-9)

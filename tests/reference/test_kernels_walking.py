@@ -230,12 +230,14 @@ def test_extrapolation_and_springs(hume):
     there, rate, tau, K = q.copy(), v.copy(), np.zeros(N), np.full(N, 350.0)
     motor, ring = np.column_stack([q[-N:] + 0.1, v[-N:]]), (np.zeros(4), np.zeros((4, N)))
     walking_state.foresee(
-        at.terms, robot.frame_mounts(FEET), there, rate, motor, 0, -1, np.zeros((2, 3)), K,
-        np.zeros((N, 2, 4)), (0.0, 1e-3, 0.0, 0.0), -20, ring, 0, tau,
+        robot.tree, at.terms, robot.frame_mounts(FEET), there, rate, motor, 0, -1,
+        np.zeros((2, 3)), K, np.zeros((N, 2, 4)), (0.0, 1e-3, 0.0, 0.0), -20, ring, 0, tau,
     )  # fmt: skip
     expected = robot.integrate(q, 0.02 * v)
     np.testing.assert_allclose(there, expected, atol=1e-12)
     np.testing.assert_allclose(tau, 350.0 * (motor[:, 0] - expected[-N:]))
+    np.testing.assert_allclose(at.nle, robot.nonlinear_effects(there, rate), atol=1e-12)
+    at.update(q, v)
 
 
 @pytest.mark.parametrize("phase", [0.02, 0.2])
@@ -248,7 +250,7 @@ def test_law_against_its_plain_twin(hume, phase):
     tau, rates, transfer = np.zeros(N), np.zeros(N), 0.06
     com = at.com, at.com_velocity, at.com_bias(), at.com_jacobian()
     assert walking_law.law(
-        at.terms, robot.frame_mounts(FEET), com, v, at.nle, False, height, swing, phase,
+        at.terms, robot.frame_mounts(FEET), v, at.nle, False, height, swing, phase,
         (transfer, 0.1), 0, gains, tau, rates,
     )  # fmt: skip
     z = 0.9 + 0.01 + 0.002, 0.1 + 0.04, 0.4

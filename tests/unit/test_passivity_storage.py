@@ -3,6 +3,10 @@
 import numpy as np
 import pytest
 
+from helpers.chains import chain
+from helpers.controllers import StoringPD
+from sealag.actuation import actuators
+from sealag.delay import Constant, Link
 from sealag.errors import InputError
 from sealag.passivity import (
     DelayStorage,
@@ -13,6 +17,7 @@ from sealag.passivity import (
     motor_storage,
     task_storage,
 )
+from sealag.simulation import Network, closed_loop
 
 K, B_S, D = 350.0, 0.09, 10.0
 STEP = 1e-4
@@ -106,3 +111,57 @@ def test_too_short_a_history_is_refused():
         delay_storage([0.0, 0.01], [[1.0], [1.0]], [[1.0]], delay=0.1)
     with pytest.raises(InputError, match="step"):
         DelayStorage(Y=np.eye(1), delay=1e-4, step=1e-3)
+
+
+def test_the_audit_books_the_same_storage_functions(tmp_path):
+    """V_1, V_2, V_3 of every logged instant, and S_j = V_1 + V_2 behind the joint side's slack."""
+    robot = chain(tmp_path, count=2)
+    springs = actuators(
+        robot.joints,
+        spring_stiffness=np.array([350.0, 200.0]),
+        rotor_inertia=np.array([0.09, 0.04]),
+        inertia_shaping=0.5,
+        motor_damping=np.array([10.0, 6.0]),
+    )
+    F = 60.0
+    run = closed_loop(
+        robot,
+        springs,
+        StoringPD(np.zeros(2), stiffness=F, motor=True),
+        q=np.array([0.4, -0.3]),
+        theta=np.array([0.4, -0.3]),
+        duration=0.3,
+        network=Network(
+            central_up=Link(delay=Constant(value=0.01)),
+            central_down=Link(delay=Constant(value=0.02)),
+            embedded_down=Link(delay=Constant(value=0.0)),
+        ),
+    )
+    audit, K = run.audit, springs.spring_stiffness
+    at, V_1 = robot.workspace(), []
+    for q, v in zip(run.q, run.v):
+        at.update(q, v)
+        V_1.append(link_storage(robot.mass_matrix(q), v, at.potential_energy))
+    books = audit.stores["kinetic"] + audit.stores["gravity"]
+    np.testing.assert_allclose(V_1, books, rtol=1e-10, atol=1e-12)
+
+    def V_2(inertia):
+        rows = zip(run.theta_dot, run.tau_sea)
+        return np.array([motor_storage(inertia, rate, K, tau_sea=tau) for rate, tau in rows])
+
+    books = audit.stores["spring"] + audit.stores["motor"]
+    physical = V_2(springs.rotor_inertia)
+    np.testing.assert_allclose(physical, books, rtol=1e-10, atol=1e-12)
+    V_3 = [task_storage(F * np.eye(2), theta) for theta in run.theta]
+    np.testing.assert_allclose(V_3, audit.controller_storage, rtol=1e-10)
+
+    drive = (audit.joint_flows["command"] - audit.joint_flows["damping"]).sum(axis=1)
+
+    def slack(inertia):
+        S_j = np.array(V_1) + V_2(inertia)
+        return drive + audit.scalar_flows["disturbance"] - (S_j - S_j[0])
+
+    np.testing.assert_allclose(slack(springs.shaped_inertia), audit.joint_side.slack, atol=1e-10)
+    other = np.abs(slack(springs.rotor_inertia) - audit.joint_side.slack).max()
+    assert other > 1e-3, "S_j holds the shaped inertia, not the rotor's own"
+    assert np.ptp(audit.stores["gravity"]) > 0.1

@@ -84,6 +84,9 @@ CLAIMS = {
     "asymmetry": ("asymmetry", lambda d: d.update(asymmetry=1e-6)),
     "contraction": ("contraction", lambda d: d.update(contraction=d["contraction"] * 0.999)),
     "contraction up": ("contraction", lambda d: d.update(contraction=d["contraction"] * 1.001)),
+    "gravity": ("instant 0: gravity gradient", lambda d: d.update(gravity="planned")),
+    "levels": ("priority levels", lambda d: d["levels"].__setitem__(-1, 3)),
+    "form": ("verdict", lambda d: d.update(stiffness_form="best")),
     "Q": ("instant 0: W = d Q", lambda d: d["proofs"][0]["Q"][0][0].__setitem__(0, 1.0)),
 }
 

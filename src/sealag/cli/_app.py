@@ -111,12 +111,27 @@ def margin(
 def verify(
     certificate: Annotated[Path, typer.Argument(help="Certificate file.")],
     exact: Annotated[bool, typer.Option("--exact", help="Decide in rational arithmetic.")] = False,
+    project: Annotated[
+        str | None,
+        typer.Option(
+            "--project",
+            help="Also check hashes, delay and all that follows from this project and its URDF.",
+        ),
+    ] = None,
+    motion: Annotated[
+        Path | None,
+        typer.Option("--motion", help="The motion that was certified; with --project."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a certificate again from its numbers alone; exit status 1 if it does not hold."""
+    """Check a certificate from its numbers alone, or also against its project; 1 if it is bad."""
     from sealag.cli._commands import verify_certificate
 
-    raise typer.Exit(verify_certificate(certificate, exact=exact, as_json=as_json))
+    raise typer.Exit(
+        verify_certificate(
+            certificate, exact=exact, project=project, motion=motion, as_json=as_json
+        )
+    )
 
 
 @app.command()

@@ -113,6 +113,8 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         print(f"{name:26} {value}")
     for reason in certificate.reasons:
         print(f"not certified because {reason}")
+    for bound, reason in certificate.left_open.items():
+        print(f"left open is a longer {bound}: {reason}")
     for assumption in certificate.assumptions:
         print(f"assumes that {assumption}")
 
@@ -147,11 +149,20 @@ def margin_project(
         print(f"{_ms(low):>14} to {_ms(high):14} {count} unstable roots")
 
 
-def verify_certificate(path: Path, *, exact: bool, as_json: bool) -> int:
-    """Check a certificate; 1 if it does not hold."""
+def verify_certificate(
+    path: Path, *, exact: bool, project: str | None, motion: Path | None, as_json: bool
+) -> int:
+    """Check a certificate, against its project if one is given; 1 if it does not hold."""
+    from sealag.design import verify_design
     from sealag.passivity import verify
 
-    result = verify(path, exact=exact)
+    if project is None:
+        if motion is not None:
+            raise InputError("--motion says nothing without --project.")
+        result = verify(path, exact=exact)
+    else:
+        system = load(project)
+        result = verify_design(path, system, _motion(system, motion), exact=exact)
     if as_json:
         show_json(result.to_json_dict())
     else:

@@ -74,15 +74,23 @@ def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
     )
     progress("[7/7] writing the page")
     extra = [
-        walk_section(system.robot, walk, robust, held_out),
-        means_section(ablations, everywhere, gait),
+        walk_section(system, walk, robust, held_out),
+        means_section(system, walk, ablations, everywhere, gait),
         energy_section(walk, certificate),
         limits_section(figure, simulated, gains, delays),
         figure_5_section(traces, system.robot.joints),
         beyond_section(beyond, certificate),
     ]
     page = write_paper_page(
-        out, figure, claims, unsafe=unsafe, table=table, extra=extra, version=VERSION
+        out,
+        figure,
+        claims,
+        unsafe=unsafe,
+        table=table,
+        simulated=simulated,
+        traces=traces,
+        extra=extra,
+        version=VERSION,
     )
     return {
         "page": str(page),

@@ -10,6 +10,7 @@ from sealag.design._criteria import (
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
 from sealag.design._project import load, resolve_project
+from sealag.design._recheck import verify_design
 from sealag.design._simulate import scenario_duration, simulate, walk_scene
 from sealag.design._starter import starter_project
 from sealag.design._system import System, Tank
@@ -34,5 +35,6 @@ __all__ = [
     "scenario_duration",
     "simulate",
     "starter_project",
+    "verify_design",
     "walk_scene",
 ]

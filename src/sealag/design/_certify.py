@@ -16,11 +16,12 @@ from sealag.design._evidence import (
     frozen_loop,
     instant_proofs,
     moving_multiplier,
+    without,
     worst_motion,
 )
 from sealag.design._system import System
 from sealag.errors import InputError, either
-from sealag.passivity import Certificate, Criterion, Status, Worst
+from sealag.passivity import Certificate, Criterion, Solver, Status, Worst
 from sealag.robot import Motion
 from sealag.whole_body import (
     Feedback,
@@ -41,6 +42,7 @@ def certify(
     criterion: Criterion | str | None = None,
     time_varying: bool = False,
     proofs: int | None = PROOF_COUNT,
+    solver: Solver | None = None,
 ) -> Certificate:
     """Certify how much delay a design tolerates at every instant of a motion.
 
@@ -53,6 +55,10 @@ def certify(
             motion (about a second more); criterion certified only.
         proofs: how many of the instants with the smallest bounds the certificate holds the numbers
             of; None for all. Those that bind the common multiplier are added.
+        solver: where multipliers come from that have no closed form: of several levels, of a whole
+            motion, of polytopes; Clarabel's own interface if None. What it says is measured; if it
+            leaves open whether the design's delay is proven, the answer is not certified, with the
+            solver's own words among the reasons.
 
     Returns:
         The certificate; not certified is a result, not an error.
@@ -66,28 +72,35 @@ def certify(
     motion = system.still() if motion is None else motion
     kind = _criterion(system, motion, criterion, time_varying=time_varying, proofs=proofs)
     stack = system.evaluate(motion)
-    published = published_bounds(stack, system)
-    bounds = published if kind is Criterion.PUBLISHED else certified_bounds(stack, system)
-    shared = kind is Criterion.CERTIFIED and len(motion) > 1 and not bounds.reasons
-    common = common_multiplier(system, bounds) if shared else None
-    moving = moving_multiplier(system, motion, bounds) if shared and time_varying else None
-    held = instant_proofs(
+    published = published_bounds(stack, system, solver=solver)
+    printed = kind is Criterion.PUBLISHED
+    bounds = published if printed else certified_bounds(stack, system)
+    shared = not printed and len(motion) > 1 and not bounds.reasons
+    common = common_multiplier(system, bounds, solver=solver) if shared else None
+    moving = None
+    if shared and time_varying:
+        moving = moving_multiplier(system, motion, bounds, solver=solver)
+    held, missing = instant_proofs(
         system,
         stack,
         bounds,
         kind=kind,
         count=proofs,
         binding=common.binding if common else (),
+        solver=solver,
     )
+    if missing:
+        bounds, common, moving = without(bounds, missing), None, None
     local = frozen_loop(system, motion, stack, instant=int(np.argmin(bounds.delay)))
     return Certificate(
-        **_answer(system, stack, bounds, kind=kind, local=local),
+        **_answer(
+            system, stack, bounds, kind=kind, local=local, open_=_left_open(system, common, moving)
+        ),
         **_at_worst(system, motion, bounds, local),
-        **_shared(common, moving),
-        **_design(system),
+        **_shared(bounds, common, moving),
+        **design_entries(system),
         instants=len(motion),
-        levels=[int(row) for row in stack.levels],
-        published_max_delay_s=float(published.delay.min()),
+        published_max_delay_s=float((bounds if printed else published).delay.min()),
         assumptions=_assumptions(system, kind, motion, local),
         time_s=motion.time.tolist(),
         bounds_s=bounds.delay.tolist(),
@@ -124,9 +137,15 @@ def _criterion(
     return Criterion(name)
 
 
-def _design(system: System) -> dict[str, Any]:
-    """What the question was about."""
+def design_entries(system: System) -> dict[str, Any]:
+    """Return the entries of a certificate that come straight from the design.
+
+    Args:
+        system: the design.
+    """
     return {
+        "delay_s": system.delays.d_1,
+        "levels": system.hierarchy.levels(system.robot),
         "feedback": system.feedback.value,
         "gravity": system.gravity.value,
         "stiffness_form": system.hierarchy.form.value,
@@ -138,18 +157,36 @@ def _design(system: System) -> dict[str, Any]:
     }
 
 
+def _left_open(system: System, common: Common | None, moving: Moving | None) -> tuple[str, ...]:
+    """Bounds over the whole motion of which it is not known whether they cover the delay."""
+    parts = (("one multiplier", common), ("matrices that move", moving))
+    return tuple(
+        f"it is open whether the design's delay is proven with {what}: {found.left_open}"
+        for what, found in parts
+        if found and found.left_open and found.delay < system.delays.d_1
+    )
+
+
 def _answer(
-    system: System, stack: WholeBodyStack, bounds: Bounds, *, kind: Criterion, local: Local
+    system: System,
+    stack: WholeBodyStack,
+    bounds: Bounds,
+    *,
+    kind: Criterion,
+    local: Local,
+    open_: tuple[str, ...],
 ) -> dict[str, Any]:
     """Status with its reasons, and what decides it."""
     worst = int(np.argmin(bounds.delay))
     max_delay_s, delay_s = float(bounds.delay[worst]), system.delays.d_1
     reasons = list(bounds.reasons)
     if not reasons and delay_s > max_delay_s:
+        solver = f"; a longer one is open: {bounds.left_open}" if bounds.left_open else ""
         reasons.append(
             f"the design's delay of {delay_s * 1e3:.3f} ms exceeds the bound of "
-            f"{max_delay_s * 1e3:.3f} ms"
+            f"{max_delay_s * 1e3:.3f} ms{solver}"
         )
+    reasons += open_
     certified, margin = kind is Criterion.CERTIFIED, local.margin_s
     if certified and not reasons and local.stable and margin is not None and margin < max_delay_s:
         reasons.append(
@@ -162,7 +199,6 @@ def _answer(
         "criterion": kind,
         "max_delay_s": max_delay_s,
         "max_delay_upper_s": float(bounds.upper[worst]),
-        "delay_s": delay_s,
         "asymmetry": float(np.max(crooked)),
         "contraction": float(stack.contraction.max()),
         "reasons": tuple(reasons),
@@ -192,8 +228,13 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
     }
 
 
-def _shared(common: Common | None, moving: Moving | None) -> dict[str, Any]:
-    """Multipliers for the whole motion, where they were asked for."""
+def _shared(bounds: Bounds, common: Common | None, moving: Moving | None) -> dict[str, Any]:
+    """Multipliers for the whole motion, where they were asked for, and what solvers left open."""
+    open_ = {
+        "max_delay_s": bounds.left_open,
+        "common_multiplier_delay_s": common.left_open if common else "",
+        "time_varying_delay_s": moving.left_open if moving else "",
+    }
     W_common = None if common is None or common.W is None else common.W.tolist()
     W_moving = None if moving is None or moving.W is None else moving.W.tolist()
     return {
@@ -202,6 +243,7 @@ def _shared(common: Common | None, moving: Moving | None) -> dict[str, Any]:
         "time_varying_delay_s": moving.delay if moving else None,
         "time_varying_multiplier": W_moving,
         "time_varying_windows": moving.windows if moving else (),
+        "left_open": {name: reason for name, reason in open_.items() if reason},
     }
 
 
@@ -214,8 +256,12 @@ def _assumptions(
         "the embedded motor damping D_θ acts without delay",
         f"d_1 is at most {system.delays.d_1 * 1e3:.3f} ms; it may vary below that; where no "
         "embedded period is given, packets are sent and taken at once",
+        "the ways up and down count by their sum d_1 alone, since a stiffness is all that is fed "
+        "back; d_2 delays the feedforward and moves no root",
         "contacts neither slip nor lift off",
     ]
+    if system.delays.delayed_torque_feedback:
+        said.append("the embedded torque feedback acts without delay, though the design delays it")
     if system.gravity is GravityCompensation.PLANNED:
         said.append("gravity compensation comes from the plan and has no feedback gradient")
     if system.feedback is Feedback.STATIC_JOINT_TANK:

@@ -5,7 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.design._system import System
-from sealag.passivity import max_delay, max_delay_from_stiffness, max_delay_multitask
+from sealag.passivity import (
+    Criterion,
+    Solver,
+    max_delay,
+    max_delay_from_stiffness,
+    max_delay_multitask,
+)
 from sealag.typing import Array
 from sealag.whole_body import Feedback, StiffnessForm, TankFlow, TaskError, WholeBodyStack
 
@@ -31,6 +37,8 @@ class Bounds:
         F: (N, n, n) the stiffness that the criterion uses, Nm/rad.
         angle: (N,) angle at which its numerical radius is reached, rad.
         reasons: which conditions fail, in words.
+        left_open: why a solver proved no longer delay at the worst instant; empty if it did its
+            part.
     """
 
     delay: Array
@@ -38,6 +46,7 @@ class Bounds:
     F: Array
     angle: Array
     reasons: tuple[str, ...]
+    left_open: str = ""
 
 
 def certified_bounds(stack: WholeBodyStack, system: System) -> Bounds:
@@ -112,18 +121,45 @@ def _semidefinite(F: Array) -> Array:
     return values[:, 0] >= -1e-9 * np.maximum(np.abs(values).max(axis=1), 1e-300)
 
 
-def published_bounds(stack: WholeBodyStack, system: System) -> Bounds:
+def printed_form(system: System) -> StiffnessForm:
+    """Return the stiffness form of the published criterion.
+
+    Args:
+        system: the design.
+    """
+    force = system.hierarchy.form is StiffnessForm.FORCE
+    return StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED
+
+
+def task_stiffness(stack: WholeBodyStack, system: System, kind: Criterion) -> Array:
+    """Return the task stiffness S that a criterion uses, (N, m, m).
+
+    Args:
+        stack: the controller's matrices.
+        system: the design.
+        kind: published takes Λ K_x whatever is run, unless the stiffness has no Λ.
+    """
+    if kind is Criterion.CERTIFIED:
+        return stack.stiffness
+    if printed_form(system) is StiffnessForm.FORCE:
+        return np.broadcast_to(stack.K_x, stack.stiffness.shape)
+    return stack.Lambda @ stack.K_x
+
+
+def published_bounds(
+    stack: WholeBodyStack, system: System, *, solver: Solver | None = None
+) -> Bounds:
     """Bound of (29), or of (31) for several priority levels, as printed.
 
     Args:
         stack: the controller's matrices.
         system: the design.
+        solver: where multipliers of several levels come from; Clarabel's own interface if None.
     """
     D = system.actuators.motor_damping
-    force = system.hierarchy.form is StiffnessForm.FORCE
-    form = StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED
+    form = printed_form(system)
     levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
-    S = stack.K_x if force else stack.Lambda @ stack.K_x
+    S = task_stiffness(stack, system, Criterion.PUBLISHED)
     F = np.swapaxes(stack.J_star, -1, -2) @ S @ stack.J_star
     whole = max_delay_from_stiffness(F, D)
     if len(levels) == 1:
@@ -136,11 +172,16 @@ def published_bounds(stack: WholeBodyStack, system: System) -> Bounds:
             reasons=(),
         )
     many = max_delay_multitask(levels, D, form=form, solve=False)
-    delay, settled = np.array(many.delay), np.zeros(len(stack), dtype=bool)
-    while not settled[k := int(np.argmin(delay))]:
+    delay, settled = np.array(many.delay), dict[int, str]()
+    while (k := int(np.argmin(delay))) not in settled:
         one = [(J[k], Lambda[k], K_x) for J, Lambda, K_x in levels]
-        delay[k] = max(delay[k], float(max_delay_multitask(one, D, form=form).delay))
-        settled[k] = True
+        found = max_delay_multitask(one, D, form=form, solver=solver)
+        delay[k], settled[k] = max(delay[k], float(found.delay)), found.reason
     return Bounds(
-        delay=PUBLISHED_SHARE * delay, upper=many.upper, F=F, angle=whole.angle, reasons=()
+        delay=PUBLISHED_SHARE * delay,
+        upper=many.upper,
+        F=F,
+        angle=whole.angle,
+        reasons=(),
+        left_open=settled[k],
     )

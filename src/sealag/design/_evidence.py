@@ -1,11 +1,17 @@
 """The numbers that a certificate holds so that others can check it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sealag.design._criteria import ASYMMETRY_TOLERANCE, PROOF_SHARE, Bounds
+from sealag.design._criteria import (
+    ASYMMETRY_TOLERANCE,
+    PROOF_SHARE,
+    Bounds,
+    printed_form,
+    task_stiffness,
+)
 from sealag.design._system import System
 from sealag.errors import SolverError
 from sealag.margin import delay_margin
@@ -13,6 +19,7 @@ from sealag.passivity import (
     Criterion,
     LocalLoop,
     Proof,
+    Solver,
     Window,
     joint_multiplier,
     max_delay_common_from_stiffness,
@@ -21,7 +28,7 @@ from sealag.passivity import (
 )
 from sealag.robot import Motion
 from sealag.typing import Array
-from sealag.whole_body import Feedback, Linearisation, StiffnessForm, WholeBodyStack
+from sealag.whole_body import Feedback, Linearisation, WholeBodyStack
 
 COUPLING_TOLERANCE = 1e-6
 """Share of F from which an answer to passive motions of the base counts."""
@@ -38,11 +45,13 @@ class Common:
         delay: s.
         W: (n, n) in joint coordinates; None if nothing was proven.
         binding: instants that it was computed from.
+        left_open: why a solver proved no longer delay; empty if it did its part.
     """
 
     delay: float
     W: Array | None
     binding: tuple[int, ...]
+    left_open: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,11 +62,13 @@ class Moving:
         delay: s.
         W: (n, n) in joint coordinates; None if nothing was proven.
         windows: the polytopes.
+        left_open: why no longer delay, or none, was proven; empty if the solver did its part.
     """
 
     delay: float
     W: Array | None
     windows: tuple[Window, ...]
+    left_open: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,24 +98,34 @@ class Local:
         return self.coupling > COUPLING_TOLERANCE
 
 
-def common_multiplier(system: System, bounds: Bounds) -> Common:
+def common_multiplier(system: System, bounds: Bounds, *, solver: Solver | None) -> Common:
     """Bound with one multiplier for the whole motion.
 
     Args:
         system: the design.
         bounds: of the certified criterion.
+        solver: where multipliers come from.
     """
-    found = max_delay_common_from_stiffness(bounds.F, system.actuators.motor_damping)
-    return Common(delay=PROOF_SHARE * found.delay, W=_eased(found.W), binding=found.binding)
+    D = system.actuators.motor_damping
+    found = max_delay_common_from_stiffness(bounds.F, D, solver=solver)
+    return Common(
+        delay=PROOF_SHARE * found.delay,
+        W=_eased(found.W),
+        binding=found.binding,
+        left_open=found.reason,
+    )
 
 
-def moving_multiplier(system: System, motion: Motion, bounds: Bounds) -> Moving:
+def moving_multiplier(
+    system: System, motion: Motion, bounds: Bounds, *, solver: Solver | None
+) -> Moving:
     """Bound for stiffnesses that vary inside polytopes around the motion, window by window.
 
     Args:
         system: the design.
         motion: its instants.
         bounds: of the certified criterion.
+        solver: where multipliers come from.
     """
     D = system.actuators.motor_damping
     found = max_delay_polytope_from_stiffness(
@@ -112,9 +133,10 @@ def moving_multiplier(system: System, motion: Motion, bounds: Bounds) -> Moving:
         D,
         window=POLYTOPE_WINDOW,
         breaks=(np.flatnonzero(np.diff(motion.contact_index)) + 1).tolist(),
+        solver=solver,
     )
     if found.W is None or not np.isfinite(found.delay):
-        return Moving(delay=found.delay, W=None, windows=())
+        return Moving(delay=found.delay, W=None, windows=(), left_open=found.reason)
     sets = np.sqrt(D)[:, None] * found.boxes.M
     windows = []
     for k, (first, last) in enumerate(found.windows):
@@ -128,7 +150,12 @@ def moving_multiplier(system: System, motion: Motion, bounds: Bounds) -> Moving:
                 radius=float(found.ball[k]),
             )
         )
-    return Moving(delay=PROOF_SHARE * found.delay, W=_eased(found.W), windows=tuple(windows))
+    return Moving(
+        delay=PROOF_SHARE * found.delay,
+        W=_eased(found.W),
+        windows=tuple(windows),
+        left_open=found.reason,
+    )
 
 
 def _eased(W: Array | None) -> Array | None:
@@ -214,7 +241,8 @@ def instant_proofs(
     kind: Criterion,
     count: int | None,
     binding: tuple[int, ...],
-) -> tuple[Proof, ...]:
+    solver: Solver | None,
+) -> tuple[tuple[Proof, ...], dict[int, str]]:
     """Numbers to check for the instants with the smallest bounds, and for those that bind.
 
     Args:
@@ -224,29 +252,52 @@ def instant_proofs(
         kind: which criterion.
         count: how many of the smallest bounds; None for all.
         binding: instants that bind the common multiplier.
+        solver: where multipliers of several levels come from.
+
+    Returns:
+        The proofs, and why there is none, by instant, where none was found.
     """
     usable = (bounds.delay > 0.0) & np.isfinite(bounds.delay)
     order = np.argsort(bounds.delay, kind="stable")
     order = order[usable[order]]
     extra = [k for k in binding if usable[k] and k not in set(order[:count].tolist())]
-    return tuple(
-        _proof(system, stack, bounds, kind=kind, instant=int(k)) for k in (*order[:count], *extra)
-    )
+    proofs, missing = [], {}
+    for k in (*order[:count].tolist(), *extra):
+        try:
+            proofs.append(_proof(system, stack, bounds, kind=kind, instant=k, solver=solver))
+        except SolverError as error:
+            missing[k] = str(error)
+    return tuple(proofs), missing
+
+
+def without(bounds: Bounds, missing: dict[int, str]) -> Bounds:
+    """Withdraw bounds that nothing proves.
+
+    Args:
+        bounds: of the criterion.
+        missing: why an instant has no proof.
+    """
+    delay, upper, at = bounds.delay.copy(), bounds.upper.copy(), list(missing)
+    delay[at] = upper[at] = 0.0
+    first = min(at)
+    words = f"{len(at)} of {len(delay)} bounds have no proof, instant {first}: {missing[first]}"
+    return replace(bounds, delay=delay, upper=upper, reasons=(*bounds.reasons, words))
 
 
 def _proof(
-    system: System, stack: WholeBodyStack, bounds: Bounds, *, kind: Criterion, instant: int
+    system: System,
+    stack: WholeBodyStack,
+    bounds: Bounds,
+    *,
+    kind: Criterion,
+    instant: int,
+    solver: Solver | None,
 ) -> Proof:
     D, d, F = system.actuators.motor_damping, float(bounds.delay[instant]), bounds.F[instant]
-    published = kind is Criterion.PUBLISHED
-    force = system.hierarchy.form is StiffnessForm.FORCE
-    S = stack.stiffness[instant]
-    if published:
-        S = stack.K_x if force else stack.Lambda[instant] @ stack.K_x
-        form = StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED
+    if kind is Criterion.PUBLISHED:
         levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
         tasks = [(J[instant], Lambda[instant], K_x) for J, Lambda, K_x in levels]
-        found = task_multipliers(tasks, D, delay=d, form=form)
+        found = task_multipliers(tasks, D, delay=d, form=printed_form(system), solver=solver)
         W = [(one.W + one.W.T) / 2.0 for one in found]
     else:
         W = [joint_multiplier(F, D, d)]
@@ -254,7 +305,7 @@ def _proof(
         instant=instant,
         delay_s=d,
         J_star=stack.J_star[instant].tolist(),
-        stiffness=S.tolist(),
+        stiffness=task_stiffness(stack, system, kind)[instant].tolist(),
         F_gravity=stack.F_gravity[instant].tolist(),
         F=F.tolist(),
         W=[block.tolist() for block in W],

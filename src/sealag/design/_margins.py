@@ -65,7 +65,10 @@ def local_margins(
 ) -> LocalMargins:
     """Compute the exact local margin of the law that is run, along a motion.
 
-    Necessary and sufficient for local stability at constant delay with frozen coefficients.
+    Necessary and sufficient for local stability at constant delay with frozen coefficients. The
+    delay is d_1, the sum of all ways around the loop, however it is split: a stiffness is all that
+    is fed back, and d_2 moves no root (`sealag.margin.delay_margin` says where this ends). Embedded
+    torque feedback that the design delays is taken as immediate.
 
     Args:
         system: the design.

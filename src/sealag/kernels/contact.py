@@ -6,27 +6,28 @@ Every foot is one or several points. A point's contact frame C has rows tangent,
 import numpy as np
 from numba import njit
 
+from sealag.kernels import dynamics
 from sealag.kernels.friction import solve, twist_torque
-from sealag.kernels.rigid import cholesky, empty_terms, forward_solve, frames
+from sealag.kernels.rigid import cholesky, forward_solve
 
 
 @njit(cache=True)
 def memory_size(sizes):
     """Return how many numbers `parts` divides."""
     nq, nv, n, count, total, feet, mounted = sizes
-    state = nq + 2 * nv + 10 * n + 4 * count + 3 * total + 5
+    state = nq + 2 * nv + 10 * n + 4 * count + 3 * total + 6
     work = nv + nv * nv + 3 * count * (nv + 1) + total * (3 * nv + 6) + feet * (nv + 1)
     return state + work + mounted * (6 * nv + 18)
 
 
 @njit(cache=True)
 def motion(data, sizes):
-    """Return the first `parts` of an instant's memory: q, v, z (n, 9), acceleration, power (5,)."""
+    """Return the first `parts` of an instant's memory: q, v, z (n, 9), acceleration, power (6,)."""
     nq, nv, n = sizes[0], sizes[1], sizes[2]
     first, last = nq + nv, nq + nv + 9 * n
     return (
         data[:nq], data[nq:first], data[first:last].reshape(n, 9), data[last : last + nv],
-        data[last + nv : last + nv + 5],
+        data[last + nv : last + nv + 6],
     )  # fmt: skip
 
 
@@ -39,14 +40,14 @@ def parts(data, sizes):
         sizes: nq, nv, n, contact points P, contact and loaded points T, feet, frames F.
 
     Returns:
-        q, v, z (n, 9), acceleration (nv,), power (5,), tau (n,), force (P, 3), gap (P,),
+        q, v, z (n, 9), acceleration (nv,), power (6,), tau (n,), force (P, 3), gap (P,),
         position (T, 3), velocity, drift (T, 3), J (T, 3, nv), target (P, 3), rows (P, 3, nv),
         right (nv,), L (nv, nv), twist_rows (feet, nv), spin (feet,), and of the frames J, R, p and
-        bias as in `rigid.frames`.
+        bias as in `dynamics.frames`.
     """
     nq, nv, n, count, total, feet, mounted = sizes
     q, v, z, acceleration, power = motion(data, sizes)
-    data = data[nq + 2 * nv + 9 * n + 5 :]
+    data = data[nq + 2 * nv + 9 * n + 6 :]
     tau, data = data[:n], data[n:]
     force, data = data[: 3 * count].reshape(count, 3), data[3 * count :]
     gap, data = data[:count], data[count:]
@@ -201,15 +202,6 @@ def _contact_power(C, velocity, force, closed, out):
 
 
 @njit(cache=True)
-def _kinetic(M, v):
-    total = 0.0
-    for i in range(v.size):
-        for j in range(v.size):
-            total += 0.5 * v[i] * M[i, j] * v[j]
-    return total
-
-
-@njit(cache=True)
 def _apply(nle, joint, parameters, z, v, load, J, velocity, tau, right):
     """Write spring torques and all applied generalised forces; return the power of the loads."""
     nv, n = v.size, joint.size
@@ -230,11 +222,12 @@ def _apply(nle, joint, parameters, z, v, load, J, velocity, tau, right):
 
 
 @njit(cache=True)
-def evaluate(terms, around, state, rates, parameters, data, sizes):
+def evaluate(tree, terms, around, state, rates, parameters, data, sizes):
     """Spring torque, applied forces, contact forces and acceleration at one instant.
 
     Args:
-        terms: the robot's terms at the instant, as `sealag.robot.Workspace.terms`.
+        tree: the robot, as `sealag.robot.Robot.tree`.
+        terms: its terms, as `dynamics.allocate` returns them, written.
         around: what surrounds the robot: mounts of the feet's and loaded frames as
             `sealag.robot.Robot.frame_mounts` gives them (4 arrays), frame (T,) and offset (T, 3)
             of every point, C (P, 3, 3), anchor (P, 3), mu and ridge (P,), torsion (feet, 2) as in
@@ -243,7 +236,8 @@ def evaluate(terms, around, state, rates, parameters, data, sizes):
         rates: stabilisation rate 1/s, time in which friction may stop a point s.
         parameters: of the actuators, as in ``motor``.
         data: the instant's memory; q, v and the first two columns of z are read, the rest is
-            written. Powers: normal, tangential, torsional, load; then kinetic energy.
+            written. Powers: normal, tangential, torsional, load; then kinetic energy
+            and gravity potential.
         sizes: as in `parts`.
 
     Returns:
@@ -257,12 +251,13 @@ def evaluate(terms, around, state, rates, parameters, data, sizes):
     closed, yielding = state
     M, count = terms[0], closed.size
     foot_of, joint = frame_of[:count], q[q.size - tau.size :]
-    frames(terms, around[:4], mounted_J, R, p, bias)
+    dynamics.evaluate(tree, q, v, terms)
+    dynamics.frames(terms, around[:4], mounted_J, R, p, bias)
     points(mounted_J, R, p, bias, v, frame_of, offset, J, position, velocity, drift)
     power[3] = _apply(
         terms[1], joint, parameters, z, v, load, J[count:], velocity[count:], tau, right
     )
-    power[4] = _kinetic(M, v)
+    power[4:] = terms[10]
     demand(C, position, anchor, velocity, drift, rates[0], rates[1], target)
     if not cholesky(M, L):
         return False
@@ -277,6 +272,31 @@ def evaluate(terms, around, state, rates, parameters, data, sizes):
     _contact_power(C, velocity, force, closed, power)
     power[2] = _torsion_power(force, closed, foot_of, torsion, spin)
     return solved
+
+
+@njit(cache=True)
+def sense(data, sizes, closed, foot_of, t, out):
+    """Write what the sensors measure at an instant.
+
+    Args:
+        data: the instant's memory, evaluated.
+        sizes: as in `parts`.
+        closed: (P,) whether each contact point is closed.
+        foot_of: (P,) its foot.
+        t: the time that the measurement says, s.
+        out: the row of a `sealag.whole_body.Measurement`, written.
+    """
+    nq, nv, n = sizes[0], sizes[1], sizes[2]
+    q, v, z = motion(data, sizes)[:3]
+    tau = data[nq + 2 * nv + 9 * n + 6 :]
+    first = 1 + nq + nv
+    out[0], out[1 : 1 + nq], out[1 + nq : first] = t, q, v
+    for i in range(n):
+        out[first + i], out[first + n + i], out[first + 2 * n + i] = z[i, 0], z[i, 1], tau[i]
+    out[first + 3 * n :] = 0.0
+    for i in range(closed.size):
+        if closed[i]:
+            out[first + 3 * n + foot_of[i]] = 1.0
 
 
 @njit(cache=True)
@@ -299,20 +319,20 @@ def example():
         *mounts, np.zeros(1, np.int64), np.zeros((1, 3)), *ground, np.zeros((1, 2)),
         np.zeros((0, 3)),
     )  # fmt: skip
-    terms = empty_terms(nv, 3)
-    terms[2][:6, :6] = np.eye(6)
+    tree, terms = dynamics.example(nv)
     parameters = np.array([[350.0, 0.0, 0.1, 2.0, 10.0, 0.0, 0.1, np.inf, np.inf, np.inf]])
     state, data = (np.ones(1, np.int64), np.zeros(1)), np.zeros(memory_size(sizes))
     data[6] = 1.0
-    return terms, around, state, (50.0, 1e-3), parameters, data, sizes
+    return tree, terms, around, state, (50.0, 1e-3), parameters, data, sizes
 
 
 def warm() -> None:
     """Compile every kernel with the types used in practice."""
     arguments = example()
     evaluate(*arguments)
-    C, state, data, sizes = arguments[1][6], arguments[2], arguments[5], arguments[6]
+    C, state, data, sizes = arguments[2][6], arguments[3], arguments[6], arguments[7]
     one, instant = np.zeros((1, 3)), parts(data, sizes)
+    sense(data, sizes, state[0], arguments[2][4], 0.0, np.zeros(1 + 8 + 7 + 3 + 1))
     project(instant[15], instant[11], C, state[0], instant[13])
     demand(C, one, one, one, one, 50.0, 1e-3, one.copy())
     smallest_margin(C, one, one, np.zeros(1), state[0], 1.0)

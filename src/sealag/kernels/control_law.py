@@ -1,7 +1,93 @@
-"""What a tick of the whole-body controller needs besides its matrices: task errors and q̄(θ)."""
+"""A tick of the whole-body controller: task errors and matrices, torques, and q̄(θ)."""
 
 import numpy as np
 from numba import njit
+
+from sealag.kernels import dynamics
+from sealag.kernels.operational_space import divide, memory_size, operational_space, task_torque
+from sealag.kernels.rigid import integrate
+
+OF_FRAME, OF_MASS, OF_JOINT = 0, 1, 2
+
+
+@njit(cache=True)
+def law(tree, terms, seen, tasks, gains, state, results, memory, sizes):
+    """Write the torque J*ᵀ S x̃ + ḡ at given joint angles, and everything that it is made of.
+
+    The base follows the joints along the contact-consistent motions from the measured state.
+
+    Args:
+        tree: the robot, as `sealag.robot.Robot.tree`.
+        terms: its terms, as `dynamics.allocate` returns them, written.
+        seen: how the contacts' frames, then the tasks', are fixed (4 arrays, see
+            `sealag.robot.Robot.frame_mounts`), and their J, R, p and bias as in
+            `dynamics.frames`, written.
+        tasks: rows of contacts (c, 2): frame and its row; rows of tasks (m, 3): OF_FRAME, OF_MASS
+            or OF_JOINT, frame, row of it; the levels' first rows (k + 1,); wanted rotations
+            (F, 3, 3) and positions (F, 3) of frames, and values of the other rows (m,).
+        gains: K_x (m, m), planned gravity compensation (n,); form, star and tolerance as in
+            `operational_space`; whether tasks leave errors to higher ones; whether gravity
+            compensation is of the given joint angles instead of planned.
+        state: measured configuration (nq,), joint angles (n,), contact-consistent motions (nv, n),
+            offset of the references (m,).
+        results: J_s (c, nv), J_t (m, nv), x̃ (m,), x_d (m,) about the posture's, torque (n,).
+        memory: of the operational space, as `divide` divides it, written.
+        sizes: nv, n, c, m.
+
+    Returns:
+        False if the mass matrix is not positive definite.
+    """
+    J, R, p, bias = seen[4:]
+    contact_rows, levels = tasks[0], tasks[2]
+    K_x, planned, form, star, tolerance, consistent, fed_back = gains
+    q, joints, along, offset = state
+    J_s, J_t, error, wanted, out = results
+    nv, n, c, m = sizes
+    space = divide(memory, nv, n, c, m)
+    shift, there, still = np.zeros(nv), np.empty(q.size), np.zeros(nv)
+    for i in range(n):
+        away = joints[i] - q[q.size - n + i]
+        for k in range(nv):
+            shift[k] += along[k, i] * away
+    integrate(q, shift, nv - n, there)
+    dynamics.evaluate(tree, there, still, terms)
+    dynamics.frames(terms, seen[:4], J, R, p, bias)
+    for r in range(c):
+        J_s[r] = J[contact_rows[r, 0], contact_rows[r, 1]]
+    _read_tasks(terms, seen[4:], tasks, there[q.size - n :], J_t, error)
+    if not operational_space(
+        terms[0], terms[1], J_s, J_t, K_x, levels, form, star, tolerance, space
+    ):
+        return False
+    for r in range(m):
+        error[r] += offset[r]
+        wanted[r] = offset[r]
+    if consistent and levels.size > 2:
+        leave_to_higher(J_t, space.lift, levels, error, shift)
+        leave_to_higher(J_t, space.lift, levels, wanted, shift)
+    task_torque(space.J_star, space.stiffness, error, space.gravity if fed_back else planned, out)
+    return True
+
+
+@njit(cache=True)
+def _read_tasks(terms, placed, tasks, joints, J_t, error):
+    """Write Jacobians and errors of all task rows."""
+    J, R, p, _ = placed
+    _, task_rows, _, R_wanted, p_wanted, x_wanted = tasks
+    base = J_t.shape[1] - joints.size
+    both, last = np.empty(6), -1
+    for r in range(error.size):
+        kind, frame, row = task_rows[r, 0], task_rows[r, 1], task_rows[r, 2]
+        if kind == OF_FRAME:
+            if frame != last:
+                frame_error(R_wanted[frame], p_wanted[frame], R[frame], p[frame], both)
+                last = frame
+            J_t[r], error[r] = J[frame, row], both[row]
+        elif kind == OF_MASS:
+            J_t[r], error[r] = terms[8][row], x_wanted[r] - terms[7][0, row]
+        else:
+            J_t[r], error[r] = 0.0, x_wanted[r] - joints[row]
+            J_t[r, base + row] = 1.0
 
 
 @njit(cache=True)
@@ -139,5 +225,17 @@ def warm() -> None:
     leave_to_higher(np.zeros((1, 2)), np.zeros((1, 2)), np.array([0, 1]), np.zeros(1), np.zeros(2))
     J, S, K = np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1)
     static_step(J, S, K, np.zeros(1), np.zeros(1), np.zeros((1, 1)), np.zeros(1))
-    R, p = np.asfortranarray(np.eye(3)), np.zeros(3)
-    frame_error(np.eye(3), p, R, p, np.zeros(6))
+    nv, c, m = 7, 3, 1
+    (tree, terms), one, row = dynamics.example(nv), np.zeros(1), np.zeros((1, 3), np.int64)
+    mounts = np.ones(1, np.int64), np.eye(3)[None], np.zeros((1, 3)), np.ones((1, nv), np.int64)
+    placed = np.zeros((1, 6, nv)), np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, 6))
+    rows = np.zeros((c, 2), np.int64)
+    rows[:, 1] = np.arange(c)
+    q = np.zeros(8)
+    q[6] = 1.0
+    law(
+        tree, terms, (*mounts, *placed), (rows, row, np.arange(2), placed[1], placed[2], one),
+        (np.eye(m), one, 0, False, 1e-9, True, False), (q, one, np.zeros((nv, 1)), one),
+        (np.zeros((c, nv)), np.zeros((m, nv)), one.copy(), one.copy(), one.copy()),
+        np.zeros(memory_size(nv, 1, c, m)), (nv, 1, c, m),
+    )  # fmt: skip

@@ -20,6 +20,8 @@ SIZE = 9
 PRODUCTS = 5
 REGULAR, LIMITED, LOCKED = 0, 1, 2  # LOCKED adds to the other two
 _TERMS = 12
+_MOVING = 6  # entries of z that change by themselves; the others are constants of the step
+_LONG = 18  # terms of a series over a piece of time in which A moves z by as much as itself
 
 
 @njit(cache=True)
@@ -80,14 +82,19 @@ def _multiply(X, Y, out):
 
 
 @njit(cache=True)
-def _halvings(A, time):
+def _norm(A):
     norm = 0.0
     for j in range(SIZE):
         s = 0.0
         for i in range(SIZE):
             s += abs(A[i, j])
         norm = max(norm, s)
-    return max(0, math.ceil(math.log2(max(norm * time, 1e-30) / 0.25)))
+    return norm
+
+
+@njit(cache=True)
+def _halvings(A, time):
+    return max(0, math.ceil(math.log2(max(_norm(A) * time, 1e-30) / 0.25)))
 
 
 @njit(cache=True)
@@ -108,6 +115,27 @@ def exponential(A, time, E):
 
 
 @njit(cache=True)
+def flow(A, z, time, out):
+    """Write e^{A time} z without the exponential, by Taylor series over pieces of the time."""
+    pieces = max(1, math.ceil(_norm(A) * time))
+    t = time / pieces
+    term, rate = np.empty(SIZE), np.empty(_MOVING)
+    out[:] = z
+    for _ in range(pieces):
+        term[:] = out
+        for k in range(1, _LONG + 1):
+            for i in range(_MOVING):
+                rate[i] = 0.0
+                for j in range(SIZE):
+                    rate[i] += A[i, j] * term[j]
+            for i in range(_MOVING):
+                term[i] = rate[i] * (t / k)
+                out[i] += term[i]
+            for i in range(_MOVING, SIZE):
+                term[i] = 0.0
+
+
+@njit(cache=True)
 def advance(A, Q, time, E, W):
     """Write E = e^{A time} and W_k = ∫₀^time e^{Aᵀs} Q_k e^{As} ds for the five forms."""
     halvings = _halvings(A, time)
@@ -121,9 +149,8 @@ def advance(A, Q, time, E, W):
         weight = t
         W[k] = form * weight
         for j in range(1, _TERMS + 1):
-            _multiply(At, form, other)
-            _multiply(form, A, half)
-            form[:] = other + half
+            _multiply(At, form, other)  # form is symmetric: form A is its transpose
+            form[:] = other + other.T
             weight *= t / (j + 1)
             W[k] += form * weight
     for _ in range(halvings):
@@ -196,15 +223,15 @@ def _apply(E, z, out):
 
 
 @njit(cache=True)
-def _reversal(A, z, direction, time, E, out):
+def _reversal(A, z, direction, time, out):
     """Return the instant in (0, time) at which the speed passes through zero (Illinois)."""
     low, high = 0.0, time
     f_low = direction * z[1]
-    _apply_after(A, z, time, E, out)
+    flow(A, z, time, out)
     f_high = direction * out[1]
     for _ in range(30):
         middle = (low * f_high - high * f_low) / (f_high - f_low)
-        _apply_after(A, z, middle, E, out)
+        flow(A, z, middle, out)
         f = direction * out[1]
         if abs(f) < 1e-13 or high - low < 1e-13 * time:
             return middle
@@ -218,19 +245,12 @@ def _reversal(A, z, direction, time, E, out):
 
 
 @njit(cache=True)
-def _apply_after(A, z, time, E, out):
-    exponential(A, time, E)
-    _apply(E, z, out)
-
-
-@njit(cache=True)
 def predict(
     parameters, instant, tau_osc, tau_measured, z, step, half_step, whole_step, regular, out
 ):
     """Motor angle and speed half a step and a step ahead, out (n, 2, 2); z is not moved."""
     A = np.empty((SIZE, SIZE))
     Q = np.empty((PRODUCTS, SIZE, SIZE))
-    E = np.empty((SIZE, SIZE))
     now = np.empty(SIZE)
     then = np.empty(SIZE)
     for i in range(parameters.shape[0]):
@@ -241,10 +261,10 @@ def predict(
             _move_rotor(whole_step[i, variant], now, out[i, 1])
         else:
             generator(parameters[i], instant, variant, A, Q)
-            exponential(A, 0.5 * step, E)
-            _apply(E, now, then)
+            flow(A, now, 0.5 * step, then)
             out[i, 0, 0], out[i, 0, 1] = then[0], then[1]
-            _move_rotor(E, then, out[i, 1])
+            flow(A, then, 0.5 * step, now)
+            out[i, 1, 0], out[i, 1, 1] = now[0], now[1]
 
 
 @njit(cache=True)
@@ -300,10 +320,11 @@ def move(
         for _ in range(8):
             p = parameters[i]
             variant, direction = choose(p, instant, tau_osc[i], tau_measured[i], z[i])
-            if not whole:
+            if whole:
+                _apply(tables_E[i, variant], z[i], after)
+            else:
                 generator(p, instant, variant, A, Q)
-                exponential(A, left, E)
-            _apply(tables_E[i, variant] if whole else E, z[i], after)
+                flow(A, z[i], left, after)
             span = left
             reversing = direction != 0.0 and after[1] * direction < 0.0
             if reversing:
@@ -315,9 +336,8 @@ def move(
                     generator(p, instant, variant, A, Q)
                 else:
                     generator(p, instant, variant, A, Q)
-                    span = _reversal(A, z[i], direction, left, E, after)
-                exponential(A, span, E)
-                _apply(E, z[i], after)
+                    span = _reversal(A, z[i], direction, left, after)
+                flow(A, z[i], span, after)
             if book:
                 if not whole:
                     advance(A, Q, span, E, W)
@@ -334,10 +354,13 @@ def move(
 
 
 @njit(cache=True)
-def stores(parameters, z, q, kinetic, gravity, out):
-    """Write kinetic, gravity, spring and motor energy (4,); link angles are q's last entries."""
+def stores(parameters, z, q, power, out):
+    """Write kinetic, gravity, spring and motor energy (4,); link angles are q's last entries.
+
+    ``power`` (6,) is an instant's, whose last two are the links' energies.
+    """
     n = parameters.shape[0]
-    out[0], out[1], out[2], out[3] = kinetic, gravity, 0.0, 0.0
+    out[0], out[1], out[2], out[3] = power[4], power[5], 0.0, 0.0
     for i in range(n):
         stretch = z[i, 0] - q[q.size - n + i]
         out[2] += 0.5 * parameters[i, 0] * stretch * stretch
@@ -345,7 +368,7 @@ def stores(parameters, z, q, kinetic, gravity, out):
 
 
 @njit(cache=True)
-def tally(parameters, work, powers, step, z, q, kinetic, gravity, joint, scalar, energy, moved):
+def tally(parameters, work, powers, step, z, q, power, joint, scalar, energy, moved):
     """Add one step to the ledger: joint works, Runge-Kutta integrals of powers, store changes."""
     for i in range(parameters.shape[0]):
         joint[0, i] += work[i, 1]
@@ -360,7 +383,7 @@ def tally(parameters, work, powers, step, z, q, kinetic, gravity, joint, scalar,
         mean = powers[0, k] + 2.0 * (powers[1, k] + powers[2, k]) + powers[3, k]
         scalar[k] += step / 6.0 * mean
     before = energy.copy()
-    stores(parameters, z, q, kinetic, gravity, energy)
+    stores(parameters, z, q, power, energy)
     for k in range(4):
         moved[0] += abs(energy[k] - before[k])
 
@@ -376,6 +399,6 @@ def warm() -> None:
     link_cubic(z, tau, tau, tau, tau, 1e-3)
     move(parameters, 1.0, tau, tau, z, 1e-3, whole, forms, True, True, work)
     energy, joint, scalar = np.zeros(4), np.zeros((8, 1)), np.zeros(5)
-    stores(parameters, z, tau, 0.0, 0.0, energy)
-    powers = np.zeros((4, 5))
-    tally(parameters, work, powers, 1e-3, z, tau, 0.0, 0.0, joint, scalar, energy, np.zeros(1))
+    stores(parameters, z, tau, np.zeros(6), energy)
+    powers = np.zeros((4, 6))
+    tally(parameters, work, powers, 1e-3, z, tau, powers[0], joint, scalar, energy, np.zeros(1))

@@ -27,7 +27,6 @@ class Space(NamedTuple):
     gravity: Array  # (n,) compensation torque
     M_inverse: Array  # (nv, nv)
     P: Array  # (nv, nv)
-    square_v: Array  # (nv, nv)
     square_n: Array  # (8, n, n)
     square_c: Array  # (7, c, c)
     square_m: Array  # (5, m, m)
@@ -35,6 +34,44 @@ class Space(NamedTuple):
     wide_m: Array  # (m, nv)
     tall_n: Array  # (nv, n)
     values: Array  # (max(n, c, m),)
+
+
+@njit(cache=True)
+def memory_size(nv, n, c, m):
+    """Return how many numbers `divide` divides."""
+    wide = nv * (n + m + 2 * nv) + n * (m + 1) + 2 * m * m
+    return wide + 8 * n * n + 7 * c * c + 5 * m * m + (2 * c + m + n) * nv + max(n, c, m, 1)
+
+
+@njit(cache=True)
+def divide(memory, nv, n, c, m):
+    """Return the arrays of one operational space, views of one memory.
+
+    Args:
+        memory: (memory_size,).
+        nv: number of velocities.
+        n: number of actuated joints.
+        c: number of contact rows.
+        m: number of task rows.
+    """
+    J_star, memory = memory[: m * n].reshape(m, n), memory[m * n :]
+    Lambda, memory = memory[: m * m].reshape(m, m), memory[m * m :]
+    stiffness, memory = memory[: m * m].reshape(m, m), memory[m * m :]
+    joint_from_base, memory = memory[: nv * n].reshape(nv, n), memory[nv * n :]
+    lift, memory = memory[: m * nv].reshape(m, nv), memory[m * nv :]
+    gravity, memory = memory[:n], memory[n:]
+    M_inverse, memory = memory[: nv * nv].reshape(nv, nv), memory[nv * nv :]
+    P, memory = memory[: nv * nv].reshape(nv, nv), memory[nv * nv :]
+    square_n, memory = memory[: 8 * n * n].reshape(8, n, n), memory[8 * n * n :]
+    square_c, memory = memory[: 7 * c * c].reshape(7, c, c), memory[7 * c * c :]
+    square_m, memory = memory[: 5 * m * m].reshape(5, m, m), memory[5 * m * m :]
+    wide_c, memory = memory[: 2 * c * nv].reshape(2, c, nv), memory[2 * c * nv :]
+    wide_m, memory = memory[: m * nv].reshape(m, nv), memory[m * nv :]
+    tall_n, values = memory[: nv * n].reshape(nv, n), memory[nv * n :]
+    return Space(
+        J_star, Lambda, stiffness, joint_from_base, lift, gravity, M_inverse, P, square_n, square_c,
+        square_m, wide_c, wide_m, tall_n, values,
+    )  # fmt: skip
 
 
 def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
@@ -46,24 +83,7 @@ def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
         c: number of contact rows.
         m: number of task rows.
     """
-    return Space(
-        J_star=np.zeros((m, n)),
-        Lambda=np.zeros((m, m)),
-        stiffness=np.zeros((m, m)),
-        joint_from_base=np.zeros((nv, n)),
-        lift=np.zeros((m, nv)),
-        gravity=np.zeros(n),
-        M_inverse=np.zeros((nv, nv)),
-        P=np.zeros((nv, nv)),
-        square_v=np.zeros((nv, nv)),
-        square_n=np.zeros((8, n, n)),
-        square_c=np.zeros((7, c, c)),
-        square_m=np.zeros((5, m, m)),
-        wide_c=np.zeros((2, c, nv)),
-        wide_m=np.zeros((m, nv)),
-        tall_n=np.zeros((nv, n)),
-        values=np.zeros(max(n, c, m, 1)),
-    )
+    return divide(np.zeros(memory_size(nv, n, c, m)), nv, n, c, m)
 
 
 @njit(cache=True)
@@ -162,7 +182,7 @@ def _subtract_projection(P, X, inverse, scratch):
 @njit(cache=True)
 def _constrain(M, J_s, tolerance, space):
     """P = N_s M⁻¹, the inverse inertia that the contacts leave; False if M is not positive."""
-    if not invert_spd(M, space.M_inverse, space.square_v):
+    if not invert_spd(M, space.M_inverse, space.P):
         return False
     P = space.P
     P[:, :] = space.M_inverse
@@ -342,19 +362,6 @@ def task_torque(J_star, stiffness, error, gravity, out):
 def warm() -> None:
     """Compile every kernel of this module."""
     space = allocate(2, 1, 1, m=1)
-    for M in (np.eye(2), np.asfortranarray(np.eye(2))):
-        operational_space(
-            M,
-            np.zeros(2),
-            np.array([[1.0, 0.5]]),
-            np.array([[0.0, 1.0]]),
-            np.eye(1),
-            np.array([0, 1]),
-            SYMMETRIC,
-            False,
-            1e-10,
-            space,
-        )
     operational_spaces(
         np.eye(2)[None],
         np.zeros((1, 2)),

@@ -1,6 +1,4 @@
-"""Plant kernel: the fourth-order Runge-Kutta step of links, motors and contacts, in five parts
-between which the robot's terms are evaluated.
-"""
+"""Plant kernel: the fourth-order Runge-Kutta step of links, motors and contacts."""
 
 import numpy as np
 from numba import njit
@@ -11,80 +9,70 @@ from sealag.kernels.contact import evaluate, example, motion
 
 @njit(cache=True)
 def memory_size(nv, n):
-    """Return how many numbers the parts of a step share, see `advance`."""
-    return 8 * nv + 20 + 4 * n + nv + 7 * n
+    """Return how many numbers `shared` divides."""
+    return 8 * nv + 24 + 4 * n + nv + 7 * n
 
 
 @njit(cache=True)
 def shared(memory, nv, n):
     """Return the named parts of a step's memory.
 
-    Rates (4, nv), accelerations (4, nv) and powers (4, 5) of the stages, motor angles and speeds
+    Rates (4, nv), accelerations (4, nv) and powers (4, 6) of the stages, motor angles and speeds
     half a step and a step ahead (n, 2, 2), a displacement (nv,), and the joints' works (n, 7).
     """
-    ends = 8 * nv + 20, 8 * nv + 20 + 4 * n, 9 * nv + 20 + 4 * n
+    ends = 8 * nv + 24, 8 * nv + 24 + 4 * n, 9 * nv + 24 + 4 * n
     return (
         memory[: 4 * nv].reshape(4, nv), memory[4 * nv : 8 * nv].reshape(4, nv),
-        memory[8 * nv : ends[0]].reshape(4, 5), memory[ends[0] : ends[1]].reshape(n, 2, 2),
+        memory[8 * nv : ends[0]].reshape(4, 6), memory[ends[0] : ends[1]].reshape(n, 2, 2),
         memory[ends[1] : ends[2]], memory[ends[2] :].reshape(n, 7),
     )  # fmt: skip
 
 
 @njit(cache=True)
 def advance(
-    k, terms, around, state, rates, now, stage, following, sizes, memory, motors, step, regular,
-    book,
-):  # fmt: skip
-    """Do one of the five parts of a step.
-
-    Part 0 predicts the motors and moves to the first stage. Parts 1 to 3 take the terms of the
-    stage, evaluate it and move on, the third to the step's end. Part 4 evaluates the end.
+    tree, terms, around, state, rates, now, stage, following, sizes, memory, motors, step, regular
+):
+    """Do a step in the present contact modes.
 
     Args:
-        k: number of the part.
-        terms: of the stage or the end, as `sealag.robot.Workspace.terms`.
+        tree: the robot, as `sealag.robot.Robot.tree`.
+        terms: its terms, as ``dynamics.allocate`` returns them; scratch.
         around: what surrounds the robot, as in ``contact.evaluate``.
         state: closed and yielding (P,).
         rates: stabilisation rate 1/s, time in which friction may stop a point s.
         now: memory of the step's beginning, as in ``contact.parts``, evaluated.
-        stage: memory of the stage, written; of z angles and speeds only.
+        stage: memory of the stages; scratch.
         following: memory of the step's end, written.
         sizes: as in ``contact.parts``.
-        memory: what the parts share, as in `shared`.
+        memory: as in `shared`, written.
         motors: parameters, whether torque feedback is not delayed (1.0), command (n,) and known
             spring torque (n,), and the tables over half a step, a step, and of works.
         step: s.
-        regular: whether the step is as long as the tables' one.
-        book: whether to write the works.
+        regular: whether the step is as long as the tables' one; its works are then written.
 
     Returns:
-        False if the instant has no solution.
+        Whether every instant has a solution.
     """
-    if k == 4:
-        return evaluate(terms, around, state, rates, motors[0], following, sizes)
-    if k > 0 and not evaluate(terms, around, state, rates, motors[0], stage, sizes):
-        return False
     q, v, z, acceleration, power = motion(now, sizes)
     n = z.shape[0]
     parts = shared(memory, v.size, n)
     speeds, accelerations, powers, ahead, u, _ = parts
-    if k == 0:
-        _predict_motors(q, v, z, acceleration, motors, step, regular, motion(following, sizes)[2],
-                        ahead)  # fmt: skip
-        speeds[0], accelerations[0], powers[0] = v, acceleration, power
-    else:
-        accelerations[k], powers[k] = motion(stage, sizes)[3:]
-    if k == 3:
-        _close(q, v, z, motion(following, sizes)[:3], parts, motors, step, regular, book)
-        return True
-    there_q, there_v, there_z = motion(stage, sizes)[:3]
-    rigid.stage(
-        q, v, speeds[k], accelerations[k], step if k == 2 else 0.5 * step, v.size - n, u, there_q,
-        there_v, speeds[k + 1],
-    )  # fmt: skip
-    for i in range(n):
-        there_z[i, 0], there_z[i, 1] = ahead[i, k // 2, 0], ahead[i, k // 2, 1]
-    return True
+    _predict_motors(q, v, z, acceleration, motors, step, regular, motion(following, sizes)[2],
+                    ahead)  # fmt: skip
+    there_q, there_v, there_z, there_acceleration, there_power = motion(stage, sizes)
+    speeds[0], accelerations[0], powers[0] = v, acceleration, power
+    for k in range(1, 4):
+        rigid.stage(
+            q, v, speeds[k - 1], accelerations[k - 1], step if k == 3 else 0.5 * step, v.size - n,
+            u, there_q, there_v, speeds[k],
+        )  # fmt: skip
+        for i in range(n):
+            there_z[i, 0], there_z[i, 1] = ahead[i, k // 3, 0], ahead[i, k // 3, 1]
+        if not evaluate(tree, terms, around, state, rates, motors[0], stage, sizes):
+            return False
+        accelerations[k], powers[k] = there_acceleration, there_power
+    _close(q, v, z, motion(following, sizes)[:3], parts, motors, step, regular, regular)
+    return evaluate(tree, terms, around, state, rates, motors[0], following, sizes)
 
 
 @njit(cache=True)
@@ -128,7 +116,7 @@ def _close(q, v, z, end, parts, motors, step, regular, book):
 
 def warm() -> None:
     """Compile every kernel with the types used in practice."""
-    terms, around, state, rates, parameters, now, sizes = example()
+    tree, terms, around, state, rates, parameters, now, sizes = example()
     nv, n = 7, 1
     memory = np.zeros(memory_size(nv, n))
     shared(memory, nv, n)
@@ -136,7 +124,6 @@ def warm() -> None:
     motors = (parameters, 1.0, np.zeros(n), np.zeros(n), *tables)
     stage, following = now.copy(), now.copy()
     advance(
-        0, terms, around, state, rates, now, stage, following, sizes, memory, motors, 1e-3, True,
-        True,
-    )  # fmt: skip
+        tree, terms, around, state, rates, now, stage, following, sizes, memory, motors, 1e-3, True
+    )
     book_step(now, following, sizes, memory, motors, 1e-3)

@@ -10,8 +10,6 @@ import math
 import numpy as np
 from numba import njit
 
-GRAVITY = 9.81  # m/s², as in Pinocchio's models
-
 
 @njit(cache=True)
 def _cross(a, b, out):
@@ -109,51 +107,6 @@ def combine(q0, v0, rates, accelerations, step, base, q, v):
 
 
 @njit(cache=True)
-def frames(terms, mounts, J, R, p, bias):
-    """Write Jacobian, rotation, position and J̇ v of F frames, world-aligned, linear rows first.
-
-    Args:
-        terms: as `sealag.robot.Workspace.terms`.
-        mounts: as `sealag.robot.Robot.frame_mounts`.
-        J: (F, 6, nv), written.
-        R: (F, 3, 3), written.
-        p: (F, 3) m, written.
-        bias: (F, 6) acceleration at zero v̇, written.
-    """
-    J_world, R_joint, p_joint, twist, rate = terms[2], terms[3], terms[4], terms[5], terms[6]
-    joint, rotation, position, support = mounts
-    u = np.empty(3)
-    a = np.empty(3)
-    t = np.empty(3)
-    for f in range(joint.size):
-        j = joint[f]
-        _cross(twist[j, 3:6], position[f], u)
-        _cross(rate[j, 3:6], position[f], a)
-        for i in range(3):
-            u[i] += twist[j, i]
-            a[i] += rate[j, i]
-        _cross(twist[j, 3:6], u, t)
-        for i in range(3):
-            x, y, z = R_joint[j, i, 0], R_joint[j, i, 1], R_joint[j, i, 2]
-            p[f, i] = p_joint[j, i] + (x * position[f, 0] + y * position[f, 1] + z * position[f, 2])
-            bias[f, i] = x * (a[0] + t[0]) + y * (a[1] + t[1]) + z * (a[2] + t[2])
-            if i == 2:
-                bias[f, i] -= GRAVITY
-            bias[f, 3 + i] = x * rate[j, 3] + y * rate[j, 4] + z * rate[j, 5]
-            for c in range(3):
-                R[f, i, c] = x * rotation[f, 0, c] + y * rotation[f, 1, c] + z * rotation[f, 2, c]
-        for c in range(J_world.shape[0]):
-            if support[f, c] == 0:
-                J[f, :, c] = 0.0
-                continue
-            x, y, z = J_world[c, 3], J_world[c, 4], J_world[c, 5]
-            J[f, 0, c] = J_world[c, 0] + y * p[f, 2] - z * p[f, 1]
-            J[f, 1, c] = J_world[c, 1] + z * p[f, 0] - x * p[f, 2]
-            J[f, 2, c] = J_world[c, 2] + x * p[f, 1] - y * p[f, 0]
-            J[f, 3, c], J[f, 4, c], J[f, 5, c] = x, y, z
-
-
-@njit(cache=True)
 def cholesky(A, L):
     """Write the lower Cholesky factor of A into L; return False if A is not positive definite."""
     n = A.shape[0]
@@ -187,16 +140,6 @@ def backward_solve(L, x):
         for k in range(i + 1, x.size):
             s -= L[k, i] * x[k]
         x[i] = s / L[i, i]
-
-
-def empty_terms(nv, joints):
-    """Return zeros with the layout of `sealag.robot.Workspace.terms`, to compile kernels with."""
-    placed = np.zeros((joints, 12))
-    rotations = placed[:, :9].reshape(joints, 3, 3)
-    return (
-        np.eye(nv), np.zeros(nv), np.zeros((nv, 6)), rotations.transpose(0, 2, 1),
-        placed[:, 9:], np.zeros((joints, 6)), np.zeros((joints, 6)),
-    )  # fmt: skip
 
 
 def warm() -> None:

@@ -8,8 +8,9 @@ import math
 import numpy as np
 from numba import njit
 
+from sealag.kernels import dynamics
 from sealag.kernels.dense import invert_spd, multiply, multiply_transposed
-from sealag.kernels.rigid import backward_solve, cholesky, empty_terms, forward_solve, frames
+from sealag.kernels.rigid import backward_solve, cholesky, forward_solve
 from sealag.kernels.walking import quintic_at
 
 
@@ -131,7 +132,7 @@ def _posture(R, v, heading):
 
 
 @njit(cache=True)
-def law(terms, mounts, com, v, h, still, height, swing, phase, clock, stance, gains, tau, rates):
+def law(terms, mounts, v, h, still, height, swing, phase, clock, stance, gains, tau, rates):
     """Write the task torques, and the joint rates of the planned motion.
 
     Six tasks: CoM height, roll, pitch, swing foot. During the weight transfer the torques of both
@@ -140,7 +141,6 @@ def law(terms, mounts, com, v, h, still, height, swing, phase, clock, stance, ga
     Args:
         terms: as `sealag.robot.Workspace.terms`.
         mounts: of both feet, as `sealag.robot.Robot.frame_mounts`.
-        com: position (3,), velocity (3,), acceleration at zero v̇ (3,) and Jacobian (3, 12).
         v: (12,) velocity.
         h: (12,) Coriolis and gravity torques.
         still: whether J̇ v counts as zero.
@@ -158,17 +158,17 @@ def law(terms, mounts, com, v, h, still, height, swing, phase, clock, stance, ga
     Returns:
         Whether the torques are finite.
     """
-    nv = v.size
+    nv, com = v.size, terms[7]
     J, R, p, bias = np.empty((2, 6, nv)), np.empty((2, 3, 3)), np.empty((2, 3)), np.zeros((2, 6))
-    frames(terms, mounts, J, R, p, bias)
-    bend = 0.0 if still else com[2][2]
+    dynamics.frames(terms, mounts, J, R, p, bias)
+    bend = 0.0 if still else com[2, 2]
     if still:
         bias[:] = 0.0
     heading, z, other = np.empty((2, 3)), np.empty(3), 1 - stance
     roll, pitch, turn = _posture(terms[3][1], v, heading)
     quintic_at(height, clock[1], z)
     wanted, velocity = np.zeros(6), np.zeros(12)
-    wanted[0] = gains[6] * z[2] + gains[0] * (z[0] - com[0][2]) + gains[3] * (z[1] - com[1][2])
+    wanted[0] = gains[6] * z[2] + gains[0] * (z[0] - com[0, 2]) + gains[3] * (z[1] - com[1, 2])
     for i in range(2):
         wanted[1 + i] = -gains[1] * (pitch if i else roll)
         wanted[1 + i] -= gains[4] * (heading[i, 0] * turn[0] + heading[i, 1] * turn[1])
@@ -184,7 +184,7 @@ def law(terms, mounts, com, v, h, still, height, swing, phase, clock, stance, ga
     if not invert_spd(terms[0], M_inverse, factor):
         return False
     rows = np.zeros((12, nv))
-    _rows(J, terms[3][1], heading, com[3], stance, rows)
+    _rows(J, terms[3][1], heading, terms[8], stance, rows)
     _support(M_inverse, h, J, bias, rows[3:9], bend, stance, wanted, gains[8], tau)
     if transfer:
         back, share = np.empty(6), phase / clock[0]
@@ -193,7 +193,7 @@ def law(terms, mounts, com, v, h, still, height, swing, phase, clock, stance, ga
         _support(M_inverse, h, J, bias, turned, bend, other, wanted, gains[8], back)
         for j in range(6):
             tau[j] = share * tau[j] + (1.0 - share) * back[j]
-    velocity[3], velocity[9], velocity[10], velocity[11] = z[1], com[1][0], com[1][1], turn[2]
+    velocity[3], velocity[9], velocity[10], velocity[11] = z[1], com[1, 0], com[1, 1], turn[2]
     solution = np.empty(12)
     damped_solve(rows, velocity, gains[8], solution)
     rates[:] = solution[6:]
@@ -246,20 +246,19 @@ def carry(tau, limit, smooth, rates, tau_sea, D, D_by_K, gains, command):
 
 
 def example():
-    """Return terms, mounts, q, v and six zeros with the types used in practice."""
+    """Return tree, terms, mounts, q, v and six zeros with the types used in practice."""
     foot = np.ones((2, 12), np.int64)
     mounts = np.ones(2, np.int64), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), foot
     q = np.zeros(13)
     q[6] = 1.0
-    return empty_terms(12, 8), mounts, q, np.zeros(12), np.zeros(6)
+    return *dynamics.example(12), mounts, q, np.zeros(12), np.zeros(6)
 
 
 def warm() -> None:
     """Compile every kernel of this module."""
-    terms, mounts, _, v, six = example()
-    com = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((12, 3)).T
+    _, terms, mounts, _, v, six = example()
     law(
-        terms, mounts, com, v, v, False, np.zeros(6), np.zeros((3, 3)), 0.1, (0.05, 0.1), 0,
+        terms, mounts, v, v, False, np.zeros(6), np.zeros((3, 3)), 0.1, (0.05, 0.1), 0,
         np.zeros(9), six, six.copy(),
     )  # fmt: skip
     carry(six, six, six.copy(), six, six, six, six, np.zeros(4), six.copy())

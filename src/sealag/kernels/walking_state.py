@@ -6,8 +6,9 @@ The robot's terms are those of one instant; feet are point contacts (3 rows each
 import numpy as np
 from numba import njit
 
+from sealag.kernels import dynamics
 from sealag.kernels.dense import invert_spd
-from sealag.kernels.rigid import frames, integrate
+from sealag.kernels.rigid import integrate
 from sealag.kernels.walking_law import constrain, example
 
 
@@ -130,7 +131,7 @@ def stand(terms, mounts, q, v, h, foot, anchor, J, b):
         b: (2, 3) J̇ v, written.
     """
     R, p, bias = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 6))
-    frames(terms, mounts, J, R, p, bias)
+    dynamics.frames(terms, mounts, J, R, p, bias)
     b[:] = bias[:, :3]
     h[:] = terms[1]
     if foot < 0:
@@ -147,12 +148,13 @@ def stand(terms, mounts, q, v, h, foot, anchor, J, b):
 
 
 @njit(cache=True)
-def foresee(terms, mounts, q, v, motor, stance, foot, anchor, K, table, clock, ticks, ring, newest,
-            tau_sea):  # fmt: skip
+def foresee(tree, terms, mounts, q, v, motor, stance, foot, anchor, K, table, clock, ticks, ring,
+            newest, tau_sea):  # fmt: skip
     """Estimate the measured state by the standing foot, and predict it; q, v and motor are moved.
 
     Args:
-        terms: as `sealag.robot.Workspace.terms` at ``q``, ``v``.
+        tree: as `sealag.robot.Robot.tree`.
+        terms: as `sealag.robot.Workspace.terms`, evaluated at the end.
         mounts: of both feet, as `sealag.robot.Robot.frame_mounts`.
         q: (13,) configuration.
         v: (12,) velocity.
@@ -171,6 +173,7 @@ def foresee(terms, mounts, q, v, motor, stance, foot, anchor, K, table, clock, t
     nv, n = v.size, K.size
     base = nv - n
     J, b, h = np.empty((2, 6, nv)), np.empty((2, 3)), np.empty(nv)
+    dynamics.evaluate(tree, q, v, terms)
     stand(terms, mounts, q, v, h, foot, anchor, J, b)
     moved = np.zeros(nv)
     if ticks > 0:
@@ -186,12 +189,14 @@ def foresee(terms, mounts, q, v, motor, stance, foot, anchor, K, table, clock, t
     for j in range(n):
         tau_sea[j] = K[j] * (motor[j, 0] - q[q.size - n + j] - moved[base + j])
     integrate(q.copy(), moved, base, q)
+    dynamics.evaluate(tree, q, v, terms)
 
 
 def warm() -> None:
     """Compile every kernel of this module."""
-    terms, mounts, q, v, six = example()
+    tree, terms, mounts, q, v, six = example()
     foresee(
-        terms, mounts, q, v, np.zeros((6, 2)), 0, 0, np.zeros((2, 3)), six, np.zeros((6, 2, 4)),
-        (0.0, 1e-3, 0.0, 0.0), 1, (np.zeros(4), np.zeros((4, 6))), 0, six.copy(),
+        tree, terms, mounts, q, v, np.zeros((6, 2)), 0, 0, np.zeros((2, 3)), six,
+        np.zeros((6, 2, 4)), (0.0, 1e-3, 0.0, 0.0), 1, (np.zeros(4), np.zeros((4, 6))), 0,
+        six.copy(),
     )  # fmt: skip

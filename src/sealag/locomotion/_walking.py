@@ -177,13 +177,10 @@ class WalkingController:
             body.q[-6:] = measurement.theta
         elif options.feedback == Feedback.STATIC_JOINT:
             body.q[-6:] = measurement.theta - self.tau_task / stiffness
-        body.update()
         self._estimator.move(
             body, self.step, theta=measurement.theta, theta_dot=measurement.theta_dot,
             measured=measurement.time, now=now,
         )  # fmt: skip
-        body.update()
-        body.update_com_bias()
         if options.prediction == Prediction.NONE:
             self._estimator.tau_sea[:] = measurement.tau_sea
 
@@ -203,7 +200,7 @@ class WalkingController:
         body, step = self._body, self.step
         still = not self.options.acceleration_feedforward
         return self._kernel.law(
-            body.terms, body.mounts, body.com, body.v, body.gravity() if still else body.terms[1],
+            body.terms, body.mounts, body.v, body.gravity() if still else body.terms[1],
             still, step.height, step.swing, phase,
             (self.gait.transfer_time, step.height_time(now)), step.stance, self._gains,
             self.tau_task, self._rates,

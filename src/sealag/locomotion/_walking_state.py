@@ -21,10 +21,10 @@ class Body:
     Attributes:
         q: Configuration (nq,).
         v: Velocity (nv,).
-        terms: The robot's terms, as kernels take them.
+        tree: The robot, as kernels take it.
+        terms: Its terms, as kernels take them.
         mounts: How the feet are fixed, as kernels take it.
-        com: Position (3,), velocity (3,), acceleration at zero v̇ (3,) and Jacobian (3, nv) of the
-            centre of mass, live.
+        com: Position, velocity and acceleration at zero v̇ of the centre of mass (3, 3), live.
         angular: Angular momentum about the centre of mass (3,), live.
     """
 
@@ -32,18 +32,12 @@ class Body:
         self._workspace, self._feet = robot.workspace(), feet
         at = self._workspace
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
-        self.terms, self.mounts = at.terms, robot.frame_mounts(feet)
-        self.angular = at.momentum[3:]
-        at.update(self.q, self.v)
-        self.com = at.com, at.com_velocity, at.com_bias(), at.com_jacobian()
+        self.tree, self.terms, self.mounts = robot.tree, at.terms, robot.frame_mounts(feet)
+        self.com, self.angular = self.terms[7], at.momentum[3:]
 
     def update(self) -> None:
-        """Evaluate the terms at ``q`` and ``v``, but for the acceleration in ``com``."""
+        """Evaluate the terms at ``q`` and ``v``."""
         self._workspace.update(self.q, self.v)
-
-    def update_com_bias(self) -> None:
-        """Evaluate the acceleration in ``com`` too."""
-        self._workspace.com_bias()
 
     def gravity(self) -> Array:
         """Return the gravity torque (nv,)."""
@@ -114,7 +108,7 @@ class Estimator:
         self, body: Body, step: StepReferences, *, theta: Array, theta_dot: Array,
         measured: float, now: float,
     ) -> None:  # fmt: skip
-        """Move the body's q and v, evaluated at the measurement, to what they are ``now``.
+        """Move the body's q and v from the measurement's to what they are ``now``; evaluate there.
 
         Args:
             body: The robot.
@@ -134,7 +128,7 @@ class Estimator:
         self._motor[:, 0], self._motor[:, 1] = theta, theta_dot
         clock = measured, self._period, step.begin, step.begin + step.transfer_time
         self._kernel.foresee(
-            body.terms, body.mounts, body.q, body.v, self._motor, step.stance,
+            body.tree, body.terms, body.mounts, body.q, body.v, self._motor, step.stance,
             self._stance if self._odometry else -1, self._anchor, self._K, self._table, clock,
             ticks, self._ring, self._newest, self.tau_sea,
         )  # fmt: skip
@@ -143,6 +137,7 @@ class Estimator:
         """Stand on the new foot once it carries half of the weight."""
         old, new = self._stance, step.stance
         if new != old and step.phase(t) >= 0.5 * step.transfer_time:
+            body.update()
             self._anchor[new] = self._anchor[old] + body.foot(new) - body.foot(old)
             x, y, _ = self._anchor[new].tolist()
             self._anchor[new, 2], self._stance = step.ground(x, y), new

@@ -84,6 +84,11 @@ def delay_margin(
     that nothing explains raises. Necessary and sufficient for the frozen loop. A root
     that touches the axis only at zero frequency does so after an infinite delay: never.
 
+    One delay is enough for a law that feeds back a stiffness: its signal passes the ways up and
+    down once each, so that only their sum d_1 moves roots; the feedforward's d_2, the way down,
+    moves none. It is not enough where signals of different age meet in the loop (embedded torque
+    feedback that waits for its own way up, a predictor), nor for delays that vary.
+
     Args:
         A_0: (n, n) undelayed part, 1/s.
         A_1: (n, n) delayed part, 1/s.

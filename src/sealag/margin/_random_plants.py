@@ -9,7 +9,7 @@ from sealag.typing import Array
 from sealag.whole_body import Feedback, GravityCompensation, StiffnessForm
 
 _SYMMETRIC = 1e-9
-_FEEDBACKS = (Feedback.MOTOR, Feedback.STATIC_JOINT, Feedback.JOINT)
+_FEEDBACKS = tuple(Feedback)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,7 +17,8 @@ class SeaPlant:
     """A frozen series elastic plant with a delayed task law; no base, no contacts.
 
     M q̈ + G q + K (q − θ) = 0 and B_s θ̈ + D_θ θ̇ + K (θ − q) = −F y(t − d), with y = q for link
-    feedback and y = θ otherwise; the state is [q, θ, q̇, θ̇].
+    feedback and y = θ otherwise; the state is [q, θ, q̇, θ̇]. With the energy tank, x̂ moves with J θ̇
+    while it is empty: what it pays for is no part of the frozen loop.
 
     Attributes:
         M: (n, n) link inertia, kg m².
@@ -94,7 +95,7 @@ def random_sea_plant(
         seed: of the generator.
         joints: number of joints, or None to draw it.
         form: stiffness form, or None to draw it.
-        feedback: `motor`, `static_joint` or `joint`, or None to draw it.
+        feedback: signal that is fed back, or None to draw it.
 
     Returns:
         The plant with its frozen loop.

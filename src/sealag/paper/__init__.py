@@ -17,7 +17,12 @@ from sealag.paper._figure4 import (
     simulated_motion,
 )
 from sealag.paper._figure5 import TorqueTrace, figure_5, figure_5_claims, measured_lag
-from sealag.paper._random_table import RandomPlantTable, random_plant_table
+from sealag.paper._random_table import (
+    PlantComparison,
+    RandomPlantTable,
+    compare_plant,
+    random_plant_table,
+)
 from sealag.paper._unsafe import UnsafeExample, sea_loop, unsafe_examples
 from sealag.paper._walk import Walk, WalkCase, measure_walk, simulate_walk
 from sealag.paper._walk_errors import SensorNoise
@@ -38,6 +43,7 @@ __all__ = [
     "Claim",
     "DelayMap",
     "Figure4",
+    "PlantComparison",
     "RandomPlantTable",
     "SensorNoise",
     "TorqueTrace",
@@ -49,6 +55,7 @@ __all__ = [
     "ablation_cases",
     "ablation_table",
     "beyond_cases",
+    "compare_plant",
     "delay_map",
     "figure_4",
     "figure_4_claims",

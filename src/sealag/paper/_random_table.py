@@ -5,9 +5,71 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.errors import SolverError
-from sealag.margin import delay_margin, random_sea_plant
+from sealag.margin import SeaPlant, delay_margin, random_sea_plant
 from sealag.passivity import max_delay, max_delay_from_stiffness
 from sealag.whole_body import StiffnessForm
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlantComparison:
+    """One random plant with its exact margin and both bounds.
+
+    Attributes:
+        plant: the plant.
+        margin_s: exact delay margin, s; None if it could not be decided.
+        published_s: bound of (29) as printed, with J* Λ K_x or, for force stiffness, K_x, s.
+        certified_s: bound of the certified criterion, s; None where it refuses, or where the
+            potential has no minimum.
+    """
+
+    plant: SeaPlant
+    margin_s: float | None
+    published_s: float
+    certified_s: float | None
+
+    @property
+    def anchored(self) -> bool:
+        """Whether gravity by itself lets the links stand: else no criterion promises anything."""
+        return bool(np.linalg.eigvalsh(self.plant.G)[0] >= 0.0)
+
+    @property
+    def published_is_longer(self) -> bool:
+        """Whether (29) allows a delay at which an anchored plant is unstable."""
+        return self.anchored and self._exceeds(self.published_s)
+
+    @property
+    def certified_is_longer(self) -> bool:
+        """Whether the certified criterion does."""
+        return self.certified_s is not None and self._exceeds(self.certified_s)
+
+    def _exceeds(self, delay: float) -> bool:
+        return self.margin_s is not None and delay > self.margin_s
+
+
+def compare_plant(seed: int, *, joints: int | None = None) -> PlantComparison:
+    """Compare both criteria with the exact margin on one random plant.
+
+    Args:
+        seed: of the plant.
+        joints: number of its joints, or None to draw it.
+
+    Raises:
+        InputError: fewer than one joint.
+    """
+    plant = random_sea_plant(seed, joints=joints)
+    force = plant.form is StiffnessForm.FORCE
+    form = StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED
+    published = max_delay(plant.J, plant.Lambda, plant.K_x, plant.D_theta, form=form)
+    certified = None
+    if plant.certifiable and plant.stable:
+        certified = float(max_delay_from_stiffness(plant.F, plant.D_theta).delay)
+    try:
+        margin = delay_margin(plant.A_0, plant.A_1, symmetries=plant.symmetries).delay
+    except SolverError:
+        margin = None
+    return PlantComparison(
+        plant=plant, margin_s=margin, published_s=float(published.delay), certified_s=certified
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,40 +108,22 @@ def random_plant_table(count: int = 1000, *, seed: int = 0) -> RandomPlantTable:
         count: number of plants.
         seed: of the first; the others follow.
     """
-    longer = still = spoke = wrong = undecided = 0
-    ratios = []
-    for index in range(seed, seed + count):
-        plant = random_sea_plant(index)
-        try:
-            margin = delay_margin(plant.A_0, plant.A_1, symmetries=plant.symmetries).delay
-        except SolverError:
-            undecided += 1
-            continue
-        force = plant.form is StiffnessForm.FORCE
-        published = max_delay(
-            plant.J,
-            plant.Lambda,
-            plant.K_x,
-            plant.D_theta,
-            form=StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED,
-        )
-        anchored = bool(np.linalg.eigvalsh(plant.G)[0] >= 0.0)
-        if anchored and float(published.delay) > margin:
-            longer += 1
-            still += margin == 0.0
-        if plant.certifiable and plant.stable:
-            bound = float(max_delay_from_stiffness(plant.F, plant.D_theta).delay)
-            spoke += 1
-            wrong += bound > margin
-            if np.isfinite(margin):
-                ratios.append(margin / bound)
+    all_ = [compare_plant(index) for index in range(seed, seed + count)]
+    known = [one for one in all_ if one.margin_s is not None]
+    longer = [one for one in known if one.published_is_longer]
+    spoken = [
+        (one.margin_s, one.certified_s)
+        for one in all_
+        if one.margin_s is not None and one.certified_s is not None
+    ]
+    ratios = [margin / bound for margin, bound in spoken if np.isfinite(margin)]
     return RandomPlantTable(
         plants=count,
-        undecided=undecided,
-        published_longer=longer,
-        published_without_delay=int(still),
-        certified_spoke=spoke,
-        certified_longer=int(wrong),
+        undecided=count - len(known),
+        published_longer=len(longer),
+        published_without_delay=sum(one.margin_s == 0.0 for one in longer),
+        certified_spoke=len(spoken),
+        certified_longer=sum(one.certified_is_longer for one in known),
         smallest_ratio=float(np.min(ratios)),
         median_ratio=float(np.median(ratios)),
     )

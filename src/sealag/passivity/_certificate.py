@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 from sealag.errors import CertificateError
 from sealag.files import read_whole, write_text
 
-SCHEMA = "sealag-certificate/2"
+SCHEMA = "sealag-certificate/3"
 LARGEST_BYTES = 500_000_000
 
 _LONG = {
@@ -177,6 +177,9 @@ class Certificate:
             the motion, window by window, s; None if it was not asked for.
         time_varying_multiplier: (n, n) its multiplier W.
         time_varying_windows: those polytopes, each with the ball around it.
+        left_open: why a solver proved no longer delay, by the name of the bound: `max_delay_s`,
+            `common_multiplier_delay_s`, `time_varying_delay_s`. Such a bound below the design's
+            delay is no answer, and the design is not certified.
         published_max_delay_s: what (29) or (31) as printed gives for the same design, s.
         reasons: why it is not certified.
         assumptions: what is taken for granted.
@@ -218,6 +221,7 @@ class Certificate:
     time_varying_delay_s: float | None
     time_varying_multiplier: list[list[float]] | None
     time_varying_windows: tuple[Window, ...]
+    left_open: Mapping[str, str]
     published_max_delay_s: float
     reasons: tuple[str, ...]
     assumptions: tuple[str, ...]

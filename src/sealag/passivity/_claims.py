@@ -12,7 +12,13 @@ from sealag.passivity._definite import Reader
 from sealag.passivity._inequalities import AGREEMENT, SYMMETRY, asymmetry
 from sealag.typing import Array
 
-_FEEDBACKS = ("motor", "static_joint", "static_joint_tank", "joint")
+_WORDS = {
+    "feedback": ("motor", "static_joint", "static_joint_tank", "joint"),
+    "gravity": ("feedback", "planned", "none"),
+    "stiffness_form": ("symmetric", "published", "force"),
+    "task_inertia": ("lambda_ts", "lambda_star"),
+    "criterion": ("certified", "published"),
+}
 
 
 def content_check(data: dict[str, Any], odd: tuple[str, ...]) -> Check:
@@ -54,6 +60,7 @@ def claim_checks(data: dict[str, Any], number: Reader) -> Iterator[Check]:
     if not all(0 <= at < len(bounds) for at in proven):
         raise ValueError("a proof belongs to no instant")
     yield from _instants(data, bounds, proven)
+    yield _levels(data)
     yield _verdict(data)
     yield _published(data)
     yield _conservatism(data)
@@ -100,18 +107,32 @@ def _instants(data: dict[str, Any], bounds: list[float], proven: list[int]) -> I
     )
 
 
+def _levels(data: dict[str, Any]) -> Check:
+    """Priority levels are rows of J*, from the first to the last."""
+    edges = data["levels"]
+    rows = {len(proof["J_star"]) for proof in data["proofs"]} or {edges[-1]}
+    good = edges[0] == 0 and {edges[-1]} == rows and sorted(set(edges)) == edges
+    return Check(name="priority levels", ok=good, detail=f"rows {edges}")
+
+
 def _verdict(data: dict[str, Any]) -> Check:
-    """Status, reasons and delays agree; a bound of 0 is where a condition fails."""
-    largest, delay = largest_delay(data), float(data["delay_s"])
-    enough, yes = delay <= largest, not data["reasons"]
+    """Status, reasons and delays agree; a bound of 0 is where a condition fails.
+
+    A bound over the whole motion that a solver left open below the design's delay is no answer, and
+    a law that loses its stability before its bound is not covered by it.
+    """
+    largest, delay, yes = largest_delay(data), float(data["delay_s"]), not data["reasons"]
+    shared = [data[name] for name in data["left_open"] if name != "max_delay_s"]
+    margin, certified = data["local_margin_s"], data["criterion"] == "certified"
     covered = data["criterion"] == "published" or data["feedback"] != "joint"
+    undercut = certified and data["stable"] and margin is not None and margin < largest
+    enough = delay <= largest and all(bound is None or delay <= bound for bound in shared)
     return Check(
         name="verdict",
         ok=data["status"] == ("certified" if yes else "not_certified")
-        and data["criterion"] in ("certified", "published")
-        and data["feedback"] in _FEEDBACKS
+        and all(data[key] in words for key, words in _WORDS.items())
         and delay >= 0.0
-        and (yes == enough or (largest == 0.0 and not yes))
+        and (yes == (enough and not undercut) or (largest == 0.0 and not yes))
         and (covered or largest == 0.0),
         detail=f"{data['status']} by the {data['criterion']} criterion at {delay} s",
     )

@@ -194,6 +194,7 @@ class Search:
 
     Attributes:
         factor: of the best multiplier; None if there was none.
+        delay: s; that it proves at every instant, to rounding.
         upper: s; smallest delay that was refuted.
         binding: instants that the solver was given.
         rounds: how often it was called.
@@ -201,6 +202,7 @@ class Search:
     """
 
     factor: Factor | None
+    delay: float
     upper: float
     binding: tuple[int, ...]
     rounds: int
@@ -222,7 +224,9 @@ def search(
     if not problem.M.any():
         small = np.eye(m) / (1.0 + float(np.linalg.norm(problem.J, axis=(1, 2)).max()) ** 2)
         factor = factorise(problem, small)
-        return Search(factor=factor, upper=np.inf, binding=(), rounds=0, status="no stiffness")
+        return Search(
+            factor=factor, delay=np.inf, upper=np.inf, binding=(), rounds=0, status="no stiffness"
+        )
     spread = np.linspace(0, count - 1, min(count, _FIRST)).astype(int)
     active = np.unique(np.concatenate([spread, _worst(pointwise, np.inf)]))
     best, best_delay, upper, status, rounds = None, 0.0, np.inf, "", 0
@@ -246,6 +250,7 @@ def search(
         active = np.union1d(active, fresh)
     return Search(
         factor=best,
+        delay=best_delay,
         upper=upper,
         binding=tuple(int(k) for k in active),
         rounds=rounds,

@@ -99,7 +99,7 @@ def positive_definite(matrix: Array) -> tuple[str, bool]:
     if scale is None:
         return "an entry on the diagonal is not positive", False
     lowest, room = _lowest(even * scale[:, None] * scale[None, :])
-    return f"lowest eigenvalue {lowest:.3e}, rounding {room:.1e}", lowest > room
+    return _words(lowest, room), lowest > room
 
 
 def positive_complement(
@@ -140,7 +140,12 @@ def positive_complement(
     lowest, room = _lowest((C + C.T) / 2.0 - (turn + turn.T) / 2.0)
     room += unit * float(np.linalg.norm(added))
     room += float(np.linalg.norm(np.abs(R) + unit * R_error)) ** 2 / (least - doubt)
-    return f"lowest eigenvalue {lowest:.3e}, rounding {room:.1e}", lowest > room
+    return _words(lowest, room), lowest > room
+
+
+def _words(lowest: float, room: float) -> str:
+    doubt = ", in doubt: --exact decides" if abs(lowest) <= room else ""
+    return f"lowest eigenvalue {lowest:.3e}, rounding {room:.1e}{doubt}"
 
 
 def _near_one(matrix: Array) -> Array | None:

@@ -148,6 +148,11 @@ def _stiffness(
 ) -> Iterator[Check]:
     """That F is the stiffness of the law that the file names."""
     certified = data["criterion"] == "certified"
+    yield Check(
+        name=f"{name}: gravity gradient",
+        ok=data["gravity"] == "feedback" or size(G) == 0.0,
+        detail=f"gravity compensation is {data['gravity']}",
+    )
     F_q = J.T @ S @ J - (G if certified else 0 * G)
     if certified and data["feedback"] == "static_joint":
         difference, scale = F - F @ (F_q / K[:, None]) - F_q, size(F) + size(F_q)

@@ -123,7 +123,7 @@ def _close(
         delay[k] = max(delay[k], lessened(proven, slack[k]))
         upper[k] = min(upper[k], lessened(refuted, -slack[k]))
         if upper[k] > delay[k] * (1.0 + tolerance):
-            reason = f"{solver.name} proved too little at instant {k}: {solution.status}"
+            reason = f"{solver.name} proved too little: {solution.status}"
     return delay.reshape(shape), upper.reshape(shape), reason
 
 

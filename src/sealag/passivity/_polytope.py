@@ -19,6 +19,9 @@ from sealag.passivity._solvers import ClarabelDirect, Solver
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body import StiffnessForm
 
+_TOLERANCE = 1e-4
+"""Relative distance at which proven and refuted delay of the corners have met."""
+
 _LONGEST = 1e6
 """Where bisection starts, s, if the corners have no stiffness but something around them has."""
 
@@ -37,7 +40,8 @@ class PolytopeBound:
         box: (K,) largest ‖[J*ᵀC, d J*ᵀS C^-ᵀ]‖₂ over each window's corners.
         ball: (K,) radius, in the same norm, of the ball added to the box so that all instants,
             and all between them if asked, lie inside; box + ball ≤ √2 is what proves the delay.
-        reason: why nothing was proven, in words; empty if something was.
+        reason: why nothing was proven, or that the solver left a longer delay of the corners open,
+            in words; else empty.
     """
 
     delay: float
@@ -154,13 +158,16 @@ def _polytope(
     chosen = solver if solver is not None else ClarabelDirect()
     with np.errstate(divide="ignore"):
         stiffness = 1.0 / np.linalg.norm(A, axis=(1, 2))
-    found = search(parts.corners, stiffness, tolerance=1e-4, solver=chosen)
+    found = search(parts.corners, stiffness, tolerance=_TOLERANCE, solver=chosen)
     delay, box, ball = 0.0, np.zeros(len(edges)), np.zeros(len(edges))
     if found.factor is not None:
         delay, box, ball = _largest(parts, found.factor)
     proven = delay > 0.0 and found.factor is not None
     W = found.factor.C @ found.factor.C.T if found.factor is not None and proven else None
-    words = f"{chosen.name}: {found.status}" if found.factor is None else "the balls are too large"
+    open_ = found.upper > found.delay * (1.0 + _TOLERANCE) and np.isfinite(found.delay)
+    reason = f"{chosen.name} left the bracket open: {found.status}" if open_ else ""
+    if not proven and not open_:
+        reason = "nothing was proven: the balls are too large; try shorter windows"
     return PolytopeBound(
         delay=float(lessened(delay, slack)) if proven else 0.0,
         W=W,
@@ -170,7 +177,7 @@ def _polytope(
         box_window=parts.box_window,
         box=box,
         ball=ball,
-        reason="" if proven else f"nothing was proven ({words}); try shorter windows",
+        reason=reason,
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from sealag.errors import SolverError
 from sealag.passivity._bounds import max_delay
 from sealag.passivity._multipliers import TaskMultiplier, task_multiplier
-from sealag.passivity._problem import MultiplierProblem
+from sealag.passivity._problem import MultiplierProblem, factorise
 from sealag.passivity._scaling import inverse_root, scaled_task
 from sealag.passivity._solvers import ClarabelDirect, Solver
 from sealag.typing import Array, ArrayLike
@@ -44,7 +44,8 @@ def task_multipliers(
 
     Raises:
         InputError: an array is unusable, or a batch.
-        SolverError: the delay is not below the supremum, or too close to it.
+        SolverError: the delay is not below the supremum, or too close to it, or the solver found
+            nothing that proves it.
     """
     D = np.diag(np.asarray(D_theta, dtype=float))
     with np.errstate(divide="ignore"):
@@ -79,16 +80,21 @@ def _solved(
         M=np.concatenate(stiffness, axis=-1)[None],
         blocks=(n,) * count,
     )
-    W = solver.solve(problem).W
-    if W is None:
-        raise SolverError(f"{solver.name} found no multipliers for the delay {delay:.6g} s.")
+    solution = solver.solve(problem)
+    W = solution.W
+    if W is None or factorise(problem, W) is None:
+        raise SolverError(
+            f"{solver.name} found no multipliers for the delay {delay:.6g} s: {solution.status}."
+        )
     needs = [
         (W[at, at] + delay**2 * A @ np.linalg.solve(W[at, at], A.T)) / 2.0
         for A, at in zip(stiffness, problem.slices(), strict=True)
     ]
     rest = (np.eye(n) - sum(needs)) / count
     if not np.linalg.eigvalsh(rest)[0] > 0.0:
-        raise SolverError(f"No multipliers prove the delay {delay:.6g} s: it is at the supremum.")
+        raise SolverError(
+            f"{solver.name}'s multipliers do not prove the delay {delay:.6g} s: {solution.status}."
+        )
     back = np.linalg.inv(inverse_root(D_theta, n)[0])
     parts = [back @ (need + rest) @ back.T for need in needs]
     return [(part + part.T) / 2.0 for part in parts]

@@ -31,10 +31,11 @@ def verify(certificate: Path | str | dict[str, Any], *, exact: bool = False) -> 
     delays). Redundant numbers agree, and no digit of the file differs from what was written.
 
     The maker's word stays: that the numbers are the robot's (URDF and project file are named by
-    their hashes), with `delay_s`, times, priority `levels` and the link side of the frozen loop;
-    bounds of instants without a proof, the common multiplier at them, and that they, and the motion
-    between instants, lie in the windows; `published_max_delay_s` of a `certified` certificate;
-    assumptions and versions; that something is null, is not certified, or why.
+    their hashes), with `delay_s`, times, where priority `levels` part and the link side of the
+    frozen loop; bounds of instants without a proof, the common multiplier at them, and that they,
+    and the motion between instants, lie in the windows; `published_max_delay_s` of a `certified`
+    certificate; assumptions and versions; that something is null, is not certified, or why.
+    `sealag.design.verify_design` checks most of these against project, URDF and motion.
 
     Args:
         certificate: a file, or what `read_certificate` returns.

@@ -1,5 +1,6 @@
 """What a person looks at: plots, self-contained HTML pages and MCAP recordings."""
 
+from sealag.report._bounds_page import beyond_section, figure_5_section, limits_section
 from sealag.report._mcap import McapRecorder, RecordingFile, Signal, read_recording
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page
 from sealag.report._paper_page import write_paper_page
@@ -12,10 +13,7 @@ from sealag.report._plots import (
 )
 from sealag.report._recording import write_run
 from sealag.report._walk_page import (
-    beyond_section,
     energy_section,
-    figure_5_section,
-    limits_section,
     means_section,
     playback,
     rows_table,

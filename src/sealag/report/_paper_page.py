@@ -2,15 +2,18 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from sealag.files import write_text
-from sealag.paper import Claim, Figure4, RandomPlantTable, UnsafeExample
+from sealag.paper import Claim, Figure4, RandomPlantTable, TorqueTrace, UnsafeExample
 from sealag.report._page import Cell, Figure, Section, Table, Text, render_page
 from sealag.report._plots import plot_figure_4, plot_walk_bounds
+
+TORQUE_STRIDE = 2
+"""Every how many logged instants of Fig. 5 are written."""
 
 TITLE = "Passivity of time-delayed whole-body control with series elastic actuation, recomputed"
 
@@ -22,17 +25,22 @@ def write_paper_page(
     *,
     unsafe: Sequence[UnsafeExample],
     table: RandomPlantTable,
+    simulated: Figure4,
+    traces: Sequence[TorqueTrace],
     extra: Sequence[Section] = (),
     version: str,
 ) -> Path:
     """Write the page and its CSV files.
 
     Args:
-        out: folder for `index.html`, `figure4.csv` and `figure4_instants.csv`.
+        out: folder for `index.html`, `figure4.csv`, `figure4_instants.csv`, both again for the
+            simulated walk, `figure5.csv`, and `tables/` with every table of the page.
         figure: the computed Fig. 4.
         claims: statements of the paper, checked.
         unsafe: plants on which the published criterion is unsafe.
         table: the random plants.
+        simulated: Fig. 4 over the simulated walk.
+        traces: the walks of Fig. 5.
         extra: further parts, such as the simulated walk and Fig. 5.
         version: of sealag, for the footer.
 
@@ -42,8 +50,10 @@ def write_paper_page(
     Raises:
         FileError: a file cannot be written.
     """
-    write_text(out / "figure4.csv", _figure_csv(figure))
-    write_text(out / "figure4_instants.csv", _instants_csv(figure))
+    for name, computed in (("figure4", figure), ("figure4_simulated", simulated)):
+        write_text(out / f"{name}.csv", _figure_csv(computed))
+        write_text(out / f"{name}_instants.csv", _instants_csv(computed))
+    write_text(out / "figure5.csv", _torques_csv(traces))
     sections = [
         Section(anchor="claims", title="What the paper says", blocks=[_claims_table(claims)]),
         Section(anchor="figure4", title="Fig. 4: largest delay", blocks=_figure_blocks(figure)),
@@ -59,8 +69,13 @@ def write_paper_page(
         f"millisecond of a planned 7-step walk of Hume ({len(figure.time)} instants), their "
         "statements are checked, and a corrected criterion stands beside theirs."
     )
+    for name, content in _tables_csv(sections):
+        write_text(out / "tables" / f"{name}.csv", content)
     page = render_page(
-        TITLE, lead, sections, footer=f"Computed by sealag {version}; numbers also in the CSVs."
+        TITLE,
+        lead,
+        sections,
+        footer=f"Computed by sealag {version}; numbers also in the CSV files beside this page.",
     )
     write_text(out / "index.html", page)
     return out / "index.html"
@@ -216,9 +231,36 @@ def _instants_csv(figure: Figure4) -> str:
     return _csv(head, np.column_stack(columns))
 
 
+def _torques_csv(traces: Sequence[TorqueTrace]) -> str:
+    """Delayed task torque and spring torque of all walks of Fig. 5, one after the other."""
+    joints = traces[0].walk.run.joints
+    head = ["stiffness_nm_rad", "damping_scale", "beta", "time_s"]
+    head += [f"{what}_{joint}_nm" for what in ("task_delayed", "spring") for joint in joints]
+    blocks = []
+    for trace in traces:
+        time = trace.walk.run.time
+        case = np.tile([trace.stiffness, trace.damping_scale, trace.beta], (len(time), 1))
+        blocks.append(np.column_stack([case, time, trace.command, trace.achieved])[::TORQUE_STRIDE])
+    return _csv(head, np.concatenate(blocks))
+
+
+def _tables_csv(sections: Sequence[Section]) -> Iterator[tuple[str, str]]:
+    """Name and content of every table of the page, as it is shown."""
+    for section in sections:
+        tables = [block for block in section.blocks if isinstance(block, Table)]
+        for k, block in enumerate(tables, start=1):
+            rows = [[c.text if isinstance(c, Cell) else c for c in row] for row in block.rows]
+            name = section.anchor if len(tables) == 1 else f"{section.anchor}_{k}"
+            yield name, _text_csv(block.columns, rows)
+
+
 def _csv(head: Sequence[str], rows: np.ndarray) -> str:
+    return _text_csv(head, [[f"{value:.9g}" for value in row] for row in rows])
+
+
+def _text_csv(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
-    writer.writerows([[f"{value:.9g}" for value in row] for row in rows])
+    writer.writerows(rows)
     return text.getvalue()

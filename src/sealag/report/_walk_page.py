@@ -5,17 +5,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sealag.paper import AblationTable, DelayMap, Figure4, TorqueTrace, Walk, WalkRow
+from sealag.delay import RoundTrip
+from sealag.design import System
+from sealag.paper import PUBLISHED_LAW, AblationTable, Walk, WalkRow
 from sealag.passivity import Certificate
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text
-from sealag.report._plots import plot_delay_map, plot_gait, plot_torques
+from sealag.report._plots import plot_gait
 from sealag.robot import Robot
+from sealag.typing import Array
 
 FRAMES_PER_SECOND = 30.0
 
 
 def walk_section(
-    robot: Robot,
+    system: System,
     walk: Walk,
     robust: Sequence[WalkRow],
     held_out: Sequence[WalkRow],
@@ -23,21 +26,24 @@ def walk_section(
     """Show the walk: playback, gait against plan, success with errors.
 
     Args:
-        robot: Hume.
+        system: Hume with the paper's gains and delays.
         walk: the 7-step walk at the paper's delays.
         robust: success over random terrains.
         held_out: success over 20 steps on terrains that were not looked at before.
     """
     gait = walk.case.gait
+    springs, damping = system.actuators.spring_stiffness, system.actuators.motor_damping
     return Section(
         anchor="walk",
         title="The walk, in closed loop",
         blocks=[
             Text(
                 text=(
-                    "Hume walks on the simulator: springs of 350 Nm/rad, the paper's D_θ, T_H = 20 "
-                    "+ 10 sin t ms, T_L = 3 + 2 sin t ms, unilateral contact with friction 0.8 and "
-                    "plastic impacts. No external wrench and no prescribed base motion. It took "
+                    f"Hume walks on the simulator: springs of {_span(springs)} Nm/rad, D_θ of "
+                    f"{_span(damping)} Nms/rad, T_H of {_delay(system.delays.central)} and T_L of "
+                    f"{_delay(system.delays.embedded)}, unilateral contact with friction "
+                    f"{walk.case.friction:g} and plastic impacts. No external wrench and no "
+                    "prescribed base motion. It took "
                     f"{walk.steps} steps ({walk.cause}); after the second step its apex speeds "
                     f"stay within {walk.speed_deviation:.0%} of the planned "
                     f"{gait.apex_speed:g} m/s and its step widths within "
@@ -45,7 +51,7 @@ def walk_section(
                 )
             ),
             Raw(
-                html=playback(robot, walk),
+                html=playback(system.robot, walk),
                 caption="Drag to turn. Right leg blue, left leg orange; a ring marks a foot on the "
                 "ground.",
             ),
@@ -69,17 +75,51 @@ def walk_section(
                 )
             ),
             rows_table(held_out),
-            Text(text=_why_it_falls(walk)),
         ],
     )
 
 
+def _span(values: Array) -> str:
+    low, high = float(values.min()), float(values.max())
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+def _delay(trip: RoundTrip) -> str:
+    return f"{trip.mean * 1e3:g} ms in the mean and {trip.upper_bound * 1e3:g} ms at most"
+
+
+def _why_it_falls(walk: Walk, damping: Array, ablations: Sequence[WalkRow]) -> str:
+    """How the published law fares, and what its damping would drag in the walk that walks."""
+    run, n = walk.run, len(walk.run.joints)
+    knee = next(k for k, name in enumerate(run.joints) if "knee" in name)
+    rate = float(np.sqrt(np.mean(run.v[:, run.v.shape[1] - n + knee] ** 2)))
+    carried = float(np.sqrt(np.mean(run.tau_sea[:, knee] ** 2)))
+    printed = "; ".join(
+        f"{row.name}: {row.walked} of {row.terrains} walk, {row.mean_steps:.1f} steps in the mean"
+        for row in ablations
+        if row.name.startswith(PUBLISHED_LAW)
+    )
+    return (
+        f"How the law as printed fares, {printed}. In the walk above the knee moves at "
+        f"{rate:.1f} rad/s RMS, where plain D_θθ̇ with {damping[knee]:g} Nms/rad takes "
+        f"{damping[knee] * rate:.0f} Nm, against {carried:.0f} Nm RMS that the springs carry "
+        "there. The printed law has no velocity feedforward that would make up for it, so that "
+        "the swing leg comes late."
+    )
+
+
 def means_section(
-    ablations: Sequence[WalkRow], everywhere: AblationTable, gait: Sequence[WalkRow]
+    system: System,
+    walk: Walk,
+    ablations: Sequence[WalkRow],
+    everywhere: AblationTable,
+    gait: Sequence[WalkRow],
 ) -> Section:
     """Show what each of the walking controller's means is worth.
 
     Args:
+        system: Hume with the paper's gains and delays.
+        walk: the 7-step walk.
         ablations: success with each means left out.
         everywhere: the same over spring stiffness, α, β and delays.
         gait: what makes the walk a gait.
@@ -108,6 +148,7 @@ def means_section(
                 )
             ),
             rows_table(ablations),
+            Text(text=_why_it_falls(walk, system.actuators.motor_damping, ablations)),
             Table(
                 columns=["Left out", *everywhere.conditions],
                 rows=cells,
@@ -116,107 +157,18 @@ def means_section(
             ),
             Text(
                 text=(
-                    "Not to fall is not yet to walk as planned. With constant-velocity prediction "
-                    "and footsteps by the pendulum's CoM velocity the robot stays up, but its "
-                    "speed and width wander: the prediction misses how the delayed torques and "
-                    "the change of support turn the velocity, and the CoM velocity misses the "
-                    "legs' own momentum. Each alone leaves the other's error in the footstep:"
+                    "Not to fall is not yet to walk as planned: of the walks below, "
+                    f"{sum(row.walked for row in gait)} of {sum(row.terrains for row in gait)} do "
+                    f"not fall and {sum(row.gaits for row in gait)} are gaits. Prediction at "
+                    "constant velocity misses how the torques in flight and the change of "
+                    "support turn the velocity; the CoM velocity, by which a pendulum would place "
+                    "its foot, misses the momentum of the legs. Each error alone spoils the "
+                    "footstep:"
                 )
             ),
             rows_table(gait),
         ],
     )
-
-
-def _why_it_falls(walk: Walk) -> str:
-    """What the plain damping would drag, from the walk's own joint rates."""
-    run, n = walk.run, len(walk.run.joints)
-    knee = next(k for k, name in enumerate(run.joints) if "knee" in name)
-    rate = float(np.sqrt(np.mean(run.v[:, run.v.shape[1] - n + knee] ** 2)))
-    carried = float(np.sqrt(np.mean(run.tau_sea[:, knee] ** 2)))
-    return (
-        f"Why the published law falls, without delay too: the knee moves at {rate:.1f} rad/s RMS, "
-        f"where plain D_θθ̇ with 100 Nms/rad takes {100.0 * rate:.0f} Nm, against {carried:.0f} Nm "
-        "RMS that the walk needs there. The law has no velocity feedforward to make up for it, and "
-        "the swing leg is late from the first step."
-    )
-
-
-def limits_section(
-    planned: Figure4, simulated: Figure4, rows: Sequence[WalkRow], delays: DelayMap
-) -> Section:
-    """Compare bounds over the planned and the simulated walk, and both with what walks.
-
-    Args:
-        planned: Fig. 4 over the plan.
-        simulated: Fig. 4 over the walk as simulated.
-        rows: success over spring stiffness, α and β.
-        delays: how much delay is walked.
-    """
-    unit = int(np.argmin(np.abs(planned.alpha - 1.0)))
-
-    def ms(value: float) -> Cell:
-        return Cell(text=f"{value * 1e3:.1f}", css="number")
-
-    bounds = [
-        [
-            f"(29), one leg, D_θ[0] = {damping:g} Nms/rad",
-            ms(planned.delay_s[k, unit]),
-            ms(simulated.delay_s[k, unit]),
-        ]
-        for k, damping in enumerate(planned.abduction_damping)
-    ]
-    for before, after in zip(planned.certified, simulated.certified, strict=True):
-        name = f"certified, {before.feedback.value}, {before.form.value}, gravity {before.gravity}"
-        bounds.append(
-            [name.replace("_", " ")]
-            + [ms(v.delay_s.min()) if not v.reason else Cell(text="refused", css="number")
-               for v in (before, after)]
-        )  # fmt: skip
-    return Section(
-        anchor="limits",
-        title="Bounds and what walks",
-        blocks=[
-            Table(
-                columns=["Smallest bound at α = 1 (ms)", "planned walk", "simulated walk"],
-                rows=bounds,
-                caption="In the simulated walk the foot that carries more load counts as stance.",
-            ),
-            Text(
-                text=(
-                    "The criterion bounds the delay of a position loop's passivity; it does not "
-                    "predict a fall. The walk depends on how well it works ahead of the delay and "
-                    "on where the next foot lands. The delays are scaled until it falls, over "
-                    f"{delays.terrains} rough grounds that nothing was chosen on; the controller "
-                    "knows the mean of its command's way."
-                )
-            ),
-            Figure(
-                svg=plot_delay_map(delays),
-                caption="What is walked over 7 steps, against spring stiffness and largest total "
-                "delay d_1 = T_H + T_L/2. Lines: bounds for the position loop with the paper's "
-                "gains over the planned walk. Its exact margin is 0, a biped on one point foot "
-                "being a pendulum; drawn is where the delay makes one more pair of roots unstable.",
-            ),
-            Table(
-                columns=[
-                    "K (Nm/rad)", "a gait up to (ms)", "walked up to (ms)",
-                    "certified, motor (ms)", "certified, q̄(θ) (ms)", "next crossing (ms)",
-                ],
-                rows=[
-                    [Cell(text=f"{row[0]:g}", css="number"), *(ms(value) for value in row[1:])]
-                    for row in zip(
-                        delays.stiffness, delays.longest_gait, delays.longest_walked,
-                        delays.certified_motor, delays.certified_static, delays.first_crossing,
-                        strict=True,
-                    )
-                ],
-                caption="Largest d_1 up to which every ground was walked.",
-            ),
-            Text(text="Over spring stiffness, α and β at the paper's delays:"),
-            rows_table(rows),
-        ],
-    )  # fmt: skip
 
 
 def energy_section(walk: Walk, certificate: Certificate) -> Section:
@@ -230,6 +182,8 @@ def energy_section(walk: Walk, certificate: Certificate) -> Section:
     flows, works = audit.joint_flows, audit.scalar_flows
     drive = (flows["command"] - flows["damping"]).sum(axis=1)
     observed = audit.joint_side
+    lifted = float(audit.stores["gravity"][-1] - audit.stores["gravity"][0])
+    impact = float(works["impact"][-1])
 
     def joule(value: float) -> Cell:
         return Cell(text=f"{value:.3g}", css="number")
@@ -238,9 +192,9 @@ def energy_section(walk: Walk, certificate: Certificate) -> Section:
         ["moved between the stores (throughput)", joule(float(audit.throughput[-1]))],
         ["largest error of the first law", joule(float(np.abs(audit.residual).max()))],
         ["lifted: gravity at the end less at the start",
-         joule(float(audit.stores["gravity"][-1] - audit.stores["gravity"][0]))],
+         joule(lifted)],
         ["work of the motors", joule(float(flows["motor_work"][-1].sum()))],
-        ["lost in impacts", joule(float(works["impact"][-1]))],
+        ["lost in impacts", joule(impact)],
         ["lost in sliding", joule(-float(works["sliding"][-1]))],
         ["net energy through the port from the controller", joule(float(drive[-1]))],
         ["most that the controller had given at any instant", joule(float(drive.max()))],
@@ -267,54 +221,11 @@ def energy_section(walk: Walk, certificate: Certificate) -> Section:
                     f"{joint_side}. The controller side (S_c): the law that walks states no "
                     f"storage function, and it gave up to {drive.max():.1f} J through the port "
                     "(τ_osc − D_θθ̇, θ̇); it is passive only with at least as much stored at the "
-                    "start, which is what lifting the robot and replacing impacts takes. The "
-                    f"certificate beside it is about the position loop of Theorem 1 alone: "
+                    f"start: lifting the robot took {lifted:.1f} J of it, impacts {impact:.2f} J. "
+                    "The certificate beside it is about the position loop of Theorem 1 alone: "
                     f"{verdict}, d_1 up to {bound:.1f} ms against {certificate.delay_s * 1e3:.1f} "
                     f"ms, fed back {certificate.feedback.replace('_', ' ')}."
                 )
-            ),
-        ],
-    )
-
-
-def beyond_section(rows: Sequence[WalkRow], certificate: Certificate) -> Section:
-    """Show walks beyond the paper, and what became of its future work.
-
-    Args:
-        rows: stairs, pushes and rougher ground.
-        certificate: over the planned walk, with the bound for matrices that vary in time.
-    """
-
-    def ms(value: float | None) -> str:
-        return "nothing" if value is None else f"{value * 1e3:.2f} ms"
-
-    return Section(
-        anchor="beyond",
-        title="Beyond the paper",
-        blocks=[
-            rows_table(rows),
-            Table(
-                columns=["Future work", "Here"],
-                rows=[
-                    [
-                        "(i) time-varying J*, Λ and stiffness",
-                        "One constant multiplier for the whole planned walk, which V_4 needs, "
-                        f"allows {ms(certificate.common_multiplier_delay_s)}; matrices that move "
-                        "as they like inside polytopes around it, window by window, "
-                        f"{ms(certificate.time_varying_delay_s)}; the pointwise bound is "
-                        f"{ms(certificate.max_delay_s)} "
-                        f"({certificate.feedback.replace('_', ' ')} feedback).",
-                    ],
-                    [
-                        "(ii) to (iv)",
-                        "The paper's wording of these was not at hand when this page was written, "
-                        "so none is claimed as done. What goes beyond the paper here: criteria "
-                        "for each signal that may be fed back, the exact local margin, delays "
-                        "with jitter and loss, contacts with impact and friction, wrong models "
-                        "and noisy sensors, and a closed-loop walk.",
-                    ],
-                ],
-                stack=True,
             ),
         ],
     )
@@ -346,62 +257,6 @@ def rows_table(rows: Sequence[WalkRow]) -> Table:
         ],
         caption="Largest deviations over the walks that did not fall; the first fall's cause.",
     )
-
-
-def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Section:
-    """Show Fig. 5.
-
-    Args:
-        traces: walks with several β.
-        joints: names.
-    """
-    shown = [t for t in traces if t.damping_scale == 1.0 and t.stiffness == traces[0].stiffness]
-    rows = [
-        [
-            Cell(text=f"{t.stiffness:g}", css="number"),
-            Cell(text=f"{t.damping_scale:g}", css="number"),
-            Cell(text=f"{t.beta:g}", css="number"),
-            *(_if_walked(t, f"{value:.1f}") for value in t.deviation[:3]),
-            _if_walked(t, f"{t.raw_deviation.mean():.0f}"),
-            _if_walked(t, f"{t.command_lag * 1e3:.1f}"),
-            _if_walked(t, f"{t.torque_lag * 1e3:.1f}"),
-            t.walk.cause,
-        ]
-        for t in traces
-    ]
-    channel = traces[0].channel
-    return Section(
-        anchor="figure5",
-        title="Fig. 5: command and spring torque",
-        blocks=[
-            Text(
-                text=(
-                    "Γ_osc is the torque that the tasks ask for, as late as its command acts at "
-                    "the motors; Γ_sea is the spring torque. The command τ_osc itself is at α = 1 "
-                    "mostly D_θθ̇_d, which the embedded damping takes off again and which hides β."
-                )
-            ),
-            Figure(
-                svg=plot_torques(shown, range(3)),
-                caption=f"One leg's joints at K = {shown[0].stiffness:g} Nm/rad, α = 1: Γ_osc "
-                "(thin) and Γ_sea (thick) for the smallest and largest β.",
-            ),
-            Table(
-                columns=[
-                    "K (Nm/rad)", "α", "β", *(f"{name} (Nm)" for name in joints[:3]),
-                    "τ_osc − Γ_sea (Nm)", "command late (ms)", "Γ_sea late (ms)", "walk",
-                ],
-                rows=rows,
-                caption="RMS of Γ_osc − Γ_sea for one leg's joints; mean RMS over all joints with "
-                "the feedforward left in; measured lags of the acting command and of Γ_sea behind "
-                f"what was sent, beside a mean (T_H + T_L)/2 of {channel * 1e3:.1f} ms.",
-            ),
-        ],
-    )  # fmt: skip
-
-
-def _if_walked(trace: TorqueTrace, text: str) -> Cell:
-    return Cell(text=text if trace.walk.walked else "–", css="number")
 
 
 def playback(robot: Robot, walk: Walk) -> str:

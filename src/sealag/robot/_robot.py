@@ -11,8 +11,9 @@ import pinocchio as pin
 from sealag.errors import InputError, RobotError, near
 from sealag.robot._contact import Contact
 from sealag.robot._load import check_inertias, read_model, reduce_model, resolve_urdf
+from sealag.robot._tree import Mounts, Tree, frame_mounts, tree_of
 from sealag.robot._workspace import Workspace
-from sealag.typing import Array, ArrayLike, BoolArray, IntArray
+from sealag.typing import Array, ArrayLike, BoolArray
 
 _UNLIMITED = 1e8
 
@@ -38,6 +39,7 @@ class Robot:
         effort_limit: (n,) Nm or N, inf where there is none.
         rotor_inertia: (n,) reflected rotor inertia that the URDF states, else 0, kg m².
         mass: of everything that moves, kg; what is fixed to the world is not in it.
+        tree: its bodies and joints, as compiled kernels take them.
     """
 
     name: str
@@ -53,7 +55,12 @@ class Robot:
     rotor_inertia: Array
     mass: float
     _model: Any = field(repr=False)
+    tree: Tree = field(init=False, repr=False, compare=False)
     _scratch: list[Workspace] = field(default_factory=list, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Take the tree from the model."""
+        object.__setattr__(self, "tree", tree_of(self._model))
 
     @property
     def n(self) -> int:
@@ -87,7 +94,7 @@ class Robot:
 
     def workspace(self) -> Workspace:
         """Return new memory for repeated evaluation, one for each thread."""
-        return Workspace(self._model, nv_base=self.nv_base)
+        return Workspace(self._model, self.tree, nv_base=self.nv_base)
 
     def workspace_at(self, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
         """Return the robot's own scratch memory, evaluated; the next call of it overwrites it.
@@ -273,7 +280,7 @@ class Robot:
             raise near(frame, self.frame_names(), what=f"frame of {self.name}")
         return frame
 
-    def frame_mounts(self, frames: Sequence[str]) -> tuple[IntArray, Array, Array, IntArray]:
+    def frame_mounts(self, frames: Sequence[str]) -> Mounts:
         """Return how frames are fixed to their joints, as compiled kernels take it.
 
         Args:
@@ -286,17 +293,7 @@ class Robot:
         Raises:
             UnknownNameError: a frame does not exist.
         """
-        count, model = len(frames), self._model
-        joint, support = np.zeros(count, np.int64), np.zeros((count, self.nv), np.int64)
-        rotation, position = np.zeros((count, 3, 3)), np.zeros((count, 3))
-        for f, name in enumerate(frames):
-            frame = model.frames[model.getFrameId(self.check_frame(name))]
-            joint[f] = frame.parentJoint
-            rotation[f], position[f] = frame.placement.rotation, frame.placement.translation
-            for number in list(model.supports[frame.parentJoint])[1:]:
-                moved = model.joints[number]
-                support[f, moved.idx_v : moved.idx_v + moved.nv] = 1
-        return joint, rotation, position, support
+        return frame_mounts(self._model, [self.check_frame(name) for name in frames])
 
     def frame_placement(self, frame: str, q: ArrayLike) -> tuple[Array, Array]:
         """Return a frame's rotation (3, 3) and position (3,) in the world.

@@ -1,21 +1,19 @@
 """Memory for evaluating a robot's terms again and again, as a controller or simulator does."""
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from sealag.robot._tree import Mounts, Tree, frame_mounts
 from sealag.typing import Array
-
-_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 class Workspace:
     """All terms of a robot at one configuration and velocity; `update` first, then read.
 
-    Arrays are views of memory that the next `update` overwrites: copy what must last, and keep
-    the workspace as long as its views.
+    Arrays are views of memory that the next `update` overwrites: copy what must last.
 
     Attributes:
         nv: number of velocities.
@@ -25,68 +23,55 @@ class Workspace:
         com: centre of mass (3,) in the world, m.
         com_velocity: velocity (3,) of the centre of mass in the world, m/s.
         momentum: centroidal momentum (6,): linear, then angular about the centre of mass.
-        terms: what compiled kernels take, live like the rest: M, nle, the joints' spatial
-            Jacobian (nv, 6) about the world's origin, and of every joint its rotation (N, 3, 3),
-            position (N, 3), spatial velocity (N, 6) and, less gravity's, acceleration at zero v̇
-            (N, 6), both in its own axes. `sealag.kernels.rigid.frames` makes frames of them.
+        terms: what compiled kernels take, as `sealag.kernels.dynamics.allocate` returns it.
     """
 
-    def __init__(self, model: Any, *, nv_base: int) -> None:
+    def __init__(self, model: Any, tree: Tree, *, nv_base: int) -> None:
         """Allocate memory for a model.
 
         Args:
             model: the Pinocchio model of a `Robot`.
+            tree: the same as compiled kernels take it.
             nv_base: number of base velocities, 6 or 0.
         """
-        self._model = model
+        from sealag.kernels import dynamics
+
+        self._model, self._tree, self._kernel = model, tree, dynamics
         self._data = model.createData()
-        self._zero = np.zeros(model.nv)
-        self._frames: dict[str, tuple[int, Array, Array]] = {}
-        self.nv = nv = int(model.nv)
-        self.nv_base = nv_base
-        self._q, self._v = pin.neutral(model), self._zero
-        data = self._data
-        self.M: Array = data.M.reshape(nv, nv)
-        self.nle: Array = data.nle
-        self.com: Array = data.com[0]
-        self.com_velocity: Array = data.vcom[0]
-        self.momentum: Array = data.hg.vector
-        self._com_acceleration: Array = data.acom[0]
-        self._com_jacobian: Array = data.Jcom.reshape(3, nv)
-        self.terms: tuple[Array, ...] = (
-            self.M.T,
-            self.nle,
-            data.J.reshape(6, nv).T,
-            _stacked([placement.rotation for placement in data.oMi]),
-            _stacked([placement.translation for placement in data.oMi]),
-            _stacked([twist.vector for twist in data.v]),
-            _stacked([twist.vector for twist in data.a_gf]),
-        )
+        self._frames: dict[str, _Frame] = {}
+        self.nv, self.nv_base = int(model.nv), nv_base
+        self._q = pin.neutral(model)
+        self.terms = dynamics.allocate(tree[0])
+        self.M: Array = self.terms[0]
+        self.nle: Array = self.terms[1]
+        self._com, self._com_jacobian, self.momentum, self._energy = self.terms[7:]
+        self.com: Array = self._com[0]
+        self.com_velocity: Array = self._com[1]
+        self._weight = dynamics.GRAVITY * sum(inertia.mass for inertia in model.inertias[1:])
 
     def update(self, q: Array, v: Array) -> None:
-        """Evaluate everything at a configuration and velocity, which are kept, not copied.
+        """Evaluate everything at a configuration and velocity; q is kept, not copied.
 
         Args:
             q: (nq,) configuration.
             v: (nv,) velocity.
         """
-        model, data = self._model, self._data
-        self._q, self._v = q, v
-        pin.computeAllTerms(model, data, q, v)
+        self._q = q
+        self._kernel.evaluate(self._tree, q, v, self.terms)
 
     @property
     def kinetic_energy(self) -> float:
         """Kinetic energy of the links, J."""
-        return self._data.kinetic_energy
+        return float(self._energy[0])
 
     @property
     def potential_energy(self) -> float:
         """Gravity potential, J."""
-        return self._data.potential_energy
+        return float(self._energy[1])
 
     def gravity(self) -> Array:
         """Return the gravity torque (nv,)."""
-        return pin.computeGeneralizedGravity(self._model, self._data, self._q)
+        return self._weight * self._com_jacobian[2]
 
     def com_jacobian(self) -> Array:
         """Return the Jacobian (3, nv) of the centre of mass."""
@@ -102,10 +87,7 @@ class Workspace:
 
     def com_bias(self) -> Array:
         """Return the acceleration (3,) of the centre of mass at zero joint acceleration."""
-        model, data = self._model, self._data
-        pin.forwardKinematics(model, data, self._q, self._v, self._zero)
-        pin.centerOfMass(model, data, pin.KinematicLevel.ACCELERATION)
-        return self._com_acceleration
+        return self._com[2]
 
     def centroidal_map(self) -> Array:
         """Return the centroidal momentum matrix (6, nv): linear then angular, world axes."""
@@ -117,9 +99,8 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        index, rotation, translation = self._frame(frame)
-        pin.updateFramePlacement(self._model, self._data, index)
-        return rotation, translation
+        found = self._frame(frame)
+        return found.R[0], found.p[0]
 
     def frame_jacobian(self, frame: str) -> Array:
         """Return a frame's Jacobian (6, nv): linear then angular velocity, axes of the world.
@@ -127,7 +108,7 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        return pin.getFrameJacobian(self._model, self._data, self._frame(frame)[0], _WORLD_ALIGNED)
+        return self._frame(frame).J[0]
 
     def frame_velocity(self, frame: str) -> Array:
         """Return a frame's velocity (6,): linear then angular, axes of the world.
@@ -135,9 +116,10 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        return pin.getFrameVelocity(
-            self._model, self._data, self._frame(frame)[0], _WORLD_ALIGNED
-        ).vector
+        found = self._frame(frame)
+        twist = self.terms[5][found.mounts[0][0]]
+        arm = found.p[0] - self.terms[4][1]
+        return np.concatenate([twist[:3] + np.cross(twist[3:], arm), twist[3:]])
 
     def frame_bias(self, frame: str) -> Array:
         """Return a frame's classical acceleration (6,) at zero joint acceleration, J̇ v.
@@ -145,29 +127,29 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        model, data = self._model, self._data
-        pin.forwardKinematics(model, data, self._q, self._v, self._zero)
-        return pin.getFrameClassicalAcceleration(
-            model, data, self._frame(frame)[0], _WORLD_ALIGNED
-        ).vector
+        return self._frame(frame).bias[0]
 
-    def _frame(self, name: str) -> tuple[int, Array, Array]:
-        """Return a frame's number and the views of its placement."""
+    def _frame(self, name: str) -> "_Frame":
+        """Return what is known of a frame now."""
         found = self._frames.get(name)
         if found is None:
-            index = self._model.getFrameId(name)
-            placement = self._data.oMf[index]
-            found = self._frames[name] = index, placement.rotation, placement.translation
+            found = self._frames[name] = _Frame(
+                mounts=frame_mounts(self._model, [name]),
+                J=np.zeros((1, 6, self.nv)),
+                R=np.zeros((1, 3, 3)),
+                p=np.zeros((1, 3)),
+                bias=np.zeros((1, 6)),
+            )
+        self._kernel.frames(self.terms, found.mounts, found.J, found.R, found.p, found.bias)
         return found
 
 
-def _stacked(parts: Sequence[Array]) -> Array:
-    """Return one live view (N, …) of arrays that lie in memory at equal distances."""
-    starts = np.array([part.__array_interface__["data"][0] for part in parts])
-    step = int(starts[1] - starts[0])
-    if (np.diff(starts) != step).any():
-        raise RuntimeError("Pinocchio does not keep its joints' terms side by side.")
-    first = parts[0]
-    return np.lib.stride_tricks.as_strided(
-        first, (len(parts), *first.shape), (step, *first.strides)
-    )
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Frame:
+    """How one frame is fixed, and its terms as `sealag.kernels.dynamics.frames` writes them."""
+
+    mounts: Mounts
+    J: Array
+    R: Array
+    p: Array
+    bias: Array

@@ -53,8 +53,7 @@ class Contacts:
         frame_of = np.concatenate([self.foot_of, loaded]).astype(np.int64)
         offset = np.concatenate([*offsets, np.zeros((len(loaded_frames), 3))])
         self.load = np.zeros((len(loaded_frames), 3))
-        self._owner = self.foot_of.tolist()
-        owners = [self.feet[f] for f in self._owner]
+        owners = [self.feet[f] for f in self.foot_of.tolist()]
         self.C = np.tile(np.eye(3), (self.count, 1, 1))
         self.anchor = np.zeros((self.count, 3))
         self.mu = np.array([foot.friction for foot in owners], dtype=float)
@@ -160,13 +159,6 @@ class Contacts:
         self.anchor[point] = at.position[point]
         self.closed[point] = 1
         self.yielding[point] = 0.0
-
-    def loaded(self, out: Array) -> None:
-        """Write 1.0 for every foot that has a closed point, else 0.0 (F,)."""
-        out[:] = 0.0
-        for foot, closed in zip(self._owner, self.closed.tolist()):
-            if closed:
-                out[foot] = 1.0
 
     def strike(self, at: Instant, mask: IntArray) -> tuple[Array, Array]:
         """Solve the plastic impact of the touching points; return velocity and impulses.

@@ -15,7 +15,8 @@ class Instant:
         v: Velocity (nv,).
         z: Joint vectors (n, 9) of the motor kernels: angle, speed and torque first.
         acceleration: v̇ (nv,).
-        power: Powers of holding, sliding, torsional and disturbing forces, W; kinetic energy, J.
+        power: Powers of holding, sliding, torsional and disturbing forces, W; kinetic energy
+            and gravity potential, J.
         tau: Spring torques (n,), Nm.
         force: Contact forces in their contact frames (P, 3), N.
         gap: Height of each contact point above the ground (P,), m; inf while it is loaded.
@@ -29,14 +30,13 @@ class Instant:
         L: Cholesky factor of the mass matrix (nv, nv).
         twist_rows: L⁻¹ Jᵀ of each foot's turn about its normal (feet, nv).
         spin: The rate of that turn (feet,), rad/s.
-        potential: Gravity potential, J.
         sizes: As in ``contact.parts``.
     """
 
     __slots__ = (
-        "J", "L", "acceleration", "data", "drift", "force", "gap", "position", "potential",
-        "power", "q", "right", "row", "rows", "sizes", "spin", "target", "tau", "twist_rows", "v",
-        "velocity", "z",
+        "J", "L", "acceleration", "data", "drift", "force", "gap", "position", "power", "q",
+        "right", "row", "rows", "sizes", "spin", "target", "tau", "twist_rows", "v", "velocity",
+        "z",
     )  # fmt: skip
 
     def __init__(self, sizes: tuple[int, int, int, int, int, int, int]) -> None:
@@ -45,8 +45,7 @@ class Instant:
         nq, nv, n, count = sizes[:4]
         self.sizes = sizes
         self.data = np.zeros(contact.memory_size(sizes))
-        self.row = self.data[: nq + 2 * nv + 10 * n + 5 + 3 * count]
-        self.potential = 0.0
+        self.row = self.data[: nq + 2 * nv + 10 * n + 6 + 3 * count]
         (
             self.q, self.v, self.z, self.acceleration, self.power, self.tau, self.force, self.gap,
             self.position, self.velocity, self.drift, self.J, self.target, self.rows, self.right,
@@ -61,7 +60,7 @@ class Instant:
             rows: As ``row``, below one another.
         """
         nq, nv, n, count = self.sizes[:4]
-        ends = np.cumsum([nq, nv, 9 * n, nv + 5, n])
+        ends = np.cumsum([nq, nv, 9 * n, nv + 6, n])
         q, v, z, _, tau, force = (part.copy() for part in np.split(rows, ends, axis=1))
         angle, speed, torque = (z[:, k::9].copy() for k in range(3))
         return {

@@ -49,12 +49,12 @@ class Ledger:
     def begin(self, at: Instant) -> None:
         """Open empty books at an instant."""
         self.data[:] = 0.0
-        self._stores(self._parameters, at.z, at.q, at.power[4], at.potential, self.stores)
+        self._stores(self._parameters, at.z, at.q, at.power, self.stores)
 
     def add(self, work: Array, powers: Array, step: float, at: Instant) -> None:
-        """Book one step: joint works (n, 7), stage powers (4, 5), and the stores after it."""
+        """Book one step: joint works (n, 7), stage powers (4, 6), and the stores after it."""
         self._tally(
-            self._parameters, work, powers, step, at.z, at.q, at.power[4], at.potential,
+            self._parameters, work, powers, step, at.z, at.q, at.power,
             self.joint, self.scalar, self.stores, self._moved,
         )  # fmt: skip
 
@@ -62,7 +62,7 @@ class Ledger:
         """Book an impact: what its impulses took, and the stores after it."""
         self.scalar[4] += lost
         before = self.stores.copy()
-        self._stores(self._parameters, at.z, at.q, at.power[4], at.potential, self.stores)
+        self._stores(self._parameters, at.z, at.q, at.power, self.stores)
         self._moved += np.abs(self.stores - before).sum()
 
 

@@ -27,6 +27,7 @@ from sealag.whole_body import (
 _WATCH = 5e-3  # s between two looks for a fall
 _AT_REST = 1e-12  # rad: how far the first motor angles may be from rest
 _ROUNDS = 50
+_SCALARS = ("time", "measurement_age", "command_age", "storage", "tank")
 _LONGEST = 100.0  # rad: a spring deflection beyond any physical range
 
 
@@ -163,7 +164,7 @@ class _Loop:
         first = np.zeros(n)
 
         def answer(angles: Array) -> Array:
-            self._sense(0.0)
+            self.plant.sense(0.0, truth.data)
             truth.theta[:], truth.tau_sea[:] = angles, stiffness * (angles - q[-n:])
             self.controller.reset(0.0, truth)
             self.controller.tick(0.0, truth, first)
@@ -174,7 +175,7 @@ class _Loop:
             self.plant.start(q, v, theta=guess, theta_dot=theta_dot)
         else:
             answer(np.asarray(theta, dtype=float))
-        self._sense(0.0)
+        self.plant.sense(0.0, truth.data)
         self.controller.reset(0.0, truth)
         self._up.fill(truth.data)
         self.command[1:] = first
@@ -239,7 +240,7 @@ class _Loop:
                 self.plant.step(self.acting[1:], self._torque_held)
                 if progress is not None and i % shown == 0:
                     progress(self.plant.time)
-            self._sense(self.plant.time)
+            self.plant.sense(self.plant.time, self.truth.data)
             self._record(log)
         except PlantStop as stop:
             outcome, message = stop.outcome, stop.message
@@ -258,7 +259,7 @@ class _Loop:
         if i % self._watch_steps == 0:
             self._watch()
         if i % self._embedded_steps == 0:
-            self._sense(t)
+            self.plant.sense(t, self.truth.data)
             self._up.send(t, self.truth.data)
         if i % self._central_steps == 0:
             self._up.receive(t, self.received.data)
@@ -276,14 +277,6 @@ class _Loop:
             if self._torque is not None:
                 self._torque.send(t, self.plant.tau_sea)
                 self._torque.receive(t, self._torque_held)
-
-    def _sense(self, t: float) -> None:
-        truth, plant = self.truth, self.plant
-        moving = self.robot.nq + self.robot.nv
-        truth.data[0], truth.data[1 : 1 + moving] = t, plant.instant.row[:moving]
-        truth.theta[:], truth.theta_dot[:] = plant.theta, plant.theta_dot
-        truth.tau_sea[:] = plant.tau_sea
-        plant.contacts.loaded(truth.contact)
 
     def _watch(self) -> None:
         """End the run when the robot has fallen or left any physical range."""
@@ -320,27 +313,28 @@ class _Loop:
     # Storage -----------------------------------------------------------------------------------
     def _allocate(self, rows: int) -> Log:
         n, plant = self.robot.n, self.plant
-        widths = {"time": 1, "instant": plant.instant.row.size, "tau_command": n, "tau_osc": n}
-        widths |= {"measurement_age": 1, "command_age": 1, "storage": 1, "tank": 1, "present": n}
+        widths = {"scalars": len(_SCALARS), "instant": plant.instant.row.size}
+        widths |= {"tau_command": n, "tau_osc": n, "present": n}
         widths |= dict.fromkeys(("closed", "yielding"), plant.contacts.count)
         return Log(rows, widths | {"ledger": plant.ledger.data.size})
 
     def _record(self, log: Log) -> None:
         plant, t, storage = self.plant, self.plant.time, 0.0
         if self._storing is not None:
-            self._sense(t)
+            self.plant.sense(t, self.truth.data)
             storage = self._storing.storage(t, self.truth, self._present)
-        closed, yielding = plant.contacts.state
+        received, sent, acting = self.received.data[0], self.command[0], self.acting[0]
+        tank = 0.0 if self._tank is None else self._tank.tank_energy
         log.row(
-            t, plant.instant.row, self.command[1:], self.acting[1:],
-            float(self.command[0] - self.received.data[0]), t - float(self.acting[0]), storage,
-            0.0 if self._tank is None else self._tank.tank_energy, self._present, closed,
-            yielding, plant.ledger.data,
+            (t, sent - received, t - acting, storage, tank), plant.instant.row, self.command[1:],
+            self.acting[1:], self._present, *plant.contacts.state, plant.ledger.data,
         )  # fmt: skip
 
     def _result(self, log: Log, outcome: Outcome, message: str) -> Run:
         robot, contacts, actuators = self.robot, self.plant.contacts, self.plant.actuators
-        n, time, joints = robot.n, log.column("time"), tuple(robot.joints)
+        n, joints, said = robot.n, tuple(robot.joints), log.column("scalars", len(_SCALARS))
+        scalars: dict[str, Array] = dict(zip(_SCALARS, np.ascontiguousarray(said.T)))
+        time = scalars["time"]
         state = self.plant.instant.split(log.column("instant", self.plant.instant.row.size))
         works, scalar, stores, moved = np.split(
             log.column("ledger", sum(ledger_sizes(n))), np.cumsum(ledger_sizes(n))[:-1], axis=1
@@ -357,8 +351,8 @@ class _Loop:
             **state,
             tau_command=log.column("tau_command", n),
             tau_osc=log.column("tau_osc", n),
-            measurement_age=log.column("measurement_age"),
-            command_age=log.column("command_age"),
+            measurement_age=scalars["measurement_age"],
+            command_age=scalars["command_age"],
             contact_mode=(closed * (1 + sliding)).astype(np.int64),
             events=tuple(self.plant.events),
             audit=audit(
@@ -371,17 +365,17 @@ class _Loop:
                 theta_dot=state["theta_dot"],
                 shaped_inertia=actuators.shaped_inertia,
                 ratio=actuators.rotor_inertia / actuators.shaped_inertia,
-                stated=self._stated(log),
+                stated=self._stated(log, scalars),
             ),
         )
 
-    def _stated(self, log: Log) -> Stated | None:
+    def _stated(self, log: Log, scalars: dict[str, Array]) -> Stated | None:
         """What the controller said about itself, if it does."""
         if self._storing is None:
             return None
-        tank = log.column("tank")
+        tank = scalars["tank"]
         return Stated(
-            storage=log.column("storage"),
+            storage=scalars["storage"],
             tank=tank if tank.any() else None,
             command=log.column("present", self.robot.n),
         )

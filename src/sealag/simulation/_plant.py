@@ -78,7 +78,7 @@ class Plant:
         delayed_torque_feedback: bool = False,
         stabilisation: float = 50.0,
     ) -> None:
-        from sealag.kernels import contact, motor, plant
+        from sealag.kernels import contact, dynamics, motor, plant
 
         if not (np.isfinite(step) and step > 0):
             raise InputError(f"the step must be a time > 0 s, got {step}")
@@ -87,7 +87,7 @@ class Plant:
                 f"actuators are for joints {list(actuators.joints)}, "
                 f"the robot has {list(robot.joints)}"
             )
-        self._kernel, self._evaluate_contact = plant, contact.evaluate
+        self._kernel, self._contact = plant, contact
         self.robot, self.actuators, self.step_length = robot, actuators, step
         self.contacts = Contacts(
             robot, feet, ground or FlatGround(), loaded_frames, stabilisation=stabilisation,
@@ -95,7 +95,7 @@ class Plant:
         )  # fmt: skip
         n, nv, self._sizes = robot.n, robot.nv, self.contacts.sizes
         self.time = 0.0
-        self._workspace = robot.workspace()
+        self._terms = dynamics.allocate(robot.tree[0])
         self._parameters = actuator_parameters(actuators)
         self._instant = 0.0 if delayed_torque_feedback else 1.0
         self._tables = (
@@ -138,7 +138,7 @@ class Plant:
         self.events.clear()
         self.contacts.open_all()
         self._evaluate(now)
-        self._refuse_stiffness(self._workspace.M)
+        self._refuse_stiffness(self._terms[0])
         self.contacts.refuse_buried(now)
         self.contacts.measure_gaps(now)
         try:
@@ -200,6 +200,17 @@ class Plant:
         """Everything known about the present instant."""
         return self._now
 
+    def sense(self, t: float, out: Array) -> None:
+        """Write what the sensors measure now.
+
+        Args:
+            t: The time that the measurement says, s.
+            out: The row of a `Measurement` with one contact flag for each foot.
+        """
+        self._contact.sense(
+            self._now.data, self._sizes, self.contacts.closed, self.contacts.foot_of, t, out
+        )
+
     # Motion ------------------------------------------------------------------------------------
     def step(self, tau_osc: Array, tau_measured: Array | None = None) -> None:
         """Move by one step under a held command.
@@ -236,20 +247,14 @@ class Plant:
 
     def _try(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
         """Fill the next instant with the state one step ahead in the present contact modes."""
-        following, workspace, contacts = self._next, self._workspace, self.contacts
-        motors = self._motors(tau_osc, measured)
-        for k in range(5):
-            at = following if k == 4 else self._stage
-            if k > 0:
-                workspace.update(at.q, at.v)
-            solved = self._kernel.advance(
-                k, workspace.terms, contacts.around, contacts.state, contacts.rates,
-                self._now.data, self._stage.data, following.data, self._sizes, self._memory,
-                motors, step, regular, regular,
-            )  # fmt: skip
-            if not solved:
-                raise self._unsolvable(at)
-        following.potential = workspace.potential_energy
+        following, contacts = self._next, self.contacts
+        solved = self._kernel.advance(
+            self.robot.tree, self._terms, contacts.around, contacts.state, contacts.rates,
+            self._now.data, self._stage.data, following.data, self._sizes, self._memory,
+            self._motors(tau_osc, measured), step, regular,
+        )  # fmt: skip
+        if not solved:
+            raise self._unsolvable(self._stage, following)
         if not math.isfinite(following.power[4]):
             raise PlantStop(
                 Outcome.DIVERGED, f"velocities are not finite after t = {self.time:.4f} s"
@@ -262,18 +267,16 @@ class Plant:
 
     def _evaluate(self, at: Instant) -> None:
         """Evaluate an instant's dynamics and contact forces at its q, v and z."""
-        workspace, contacts = self._workspace, self.contacts
-        workspace.update(at.q, at.v)
-        at.potential = workspace.potential_energy
-        solved = self._evaluate_contact(
-            workspace.terms, contacts.around, contacts.state, contacts.rates, self._parameters,
-            at.data, self._sizes,
+        contacts = self.contacts
+        solved = self._contact.evaluate(
+            self.robot.tree, self._terms, contacts.around, contacts.state, contacts.rates,
+            self._parameters, at.data, self._sizes,
         )  # fmt: skip
         if not solved:
             raise self._unsolvable(at)
 
-    def _unsolvable(self, at: Instant) -> PlantStop:
-        tame = float(np.abs(at.v).max()) < FASTEST
+    def _unsolvable(self, *tried: Instant) -> PlantStop:
+        tame = all(float(np.abs(at.v).max()) < FASTEST for at in tried)
         return PlantStop(
             Outcome.CONTACT_UNSOLVABLE if tame else Outcome.DIVERGED,
             f"the equations of motion have no solution after t = {self.time:.4f} s",

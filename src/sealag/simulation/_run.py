@@ -86,7 +86,7 @@ class Log:
         self._slices = dict(zip(widths, map(slice, [0, *ends[:-1].tolist()], ends.tolist())))
         self.filled = 0
 
-    def row(self, *columns: Array | IntArray | float) -> None:
+    def row(self, *columns: Array | IntArray | tuple[float, ...]) -> None:
         """Append one row, its columns in the order of the widths."""
         row = self._table[self.filled]
         for place, column in zip(self._slices.values(), columns):

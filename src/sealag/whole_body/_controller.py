@@ -12,7 +12,7 @@ from sealag.whole_body._options import ControllerOptions, TaskError
 from sealag.whole_body._protocol import Measurement
 from sealag.whole_body._stack import FORM_CODE, RANK_TOLERANCE
 from sealag.whole_body._tank import EnergyTank
-from sealag.whole_body._task_reader import TaskReader
+from sealag.whole_body._task_reader import read_tasks
 from sealag.whole_body._tasks import Feedback, GravityCompensation, Hierarchy, TaskInertia
 
 _SETTLE = 6  # iterations for q̄(θ) of the true state, where only the storage is wanted
@@ -61,29 +61,41 @@ class Controller:
         """
         from sealag.kernels import control_law, operational_space
 
-        self._law_kernels, self._space_kernels = control_law, operational_space
+        self._kernel = control_law
         self.options = options or ControllerOptions()
         self._robot, self._actuators, self._reference = robot, actuators, reference
-        self._reader = TaskReader(robot, hierarchy, posture)
-        self._form = FORM_CODE[hierarchy.form]
-        self._star = hierarchy.task_inertia is TaskInertia.LAMBDA_STAR
-        self._K_x = hierarchy.gain(robot)
-        self._levels = np.array(hierarchy.levels(robot))
-        self._consistent = self.options.task_error is TaskError.CONSISTENT
-        self._contacts, c = _contact_rows(robot, contacts)
-        self._allocate(m=len(self._K_x), c=c)
+        frames, self._tasks = read_tasks(robot, hierarchy, contacts, posture=posture)
+        self._levels, K_x = self._tasks[2], hierarchy.gain(robot)
+        sizes = robot.nv, robot.n, len(self._tasks[0]), len(K_x)
+        self._sizes, self._memory = sizes, np.zeros(operational_space.memory_size(*sizes))
+        self._space = operational_space.divide(self._memory, *sizes)
+        self._allocate(frames)
+        self._gains = (
+            K_x,
+            self._planned_gravity,
+            FORM_CODE[hierarchy.form],
+            hierarchy.task_inertia is TaskInertia.LAMBDA_STAR,
+            RANK_TOLERANCE,
+            self.options.task_error is TaskError.CONSISTENT,
+            self.options.gravity is GravityCompensation.FEEDBACK,
+        )
         self._solve(np.asarray(posture, dtype=float))
         self._along[:] = self._space.joint_from_base
-        self._planned_gravity = self._space.gravity.copy()
+        if self.options.gravity is GravityCompensation.PLANNED:
+            self._planned_gravity[:] = self._space.gravity
 
-    def _allocate(self, *, m: int, c: int) -> None:
-        nv, n, options = self._robot.nv, self._robot.n, self.options
-        self._space = self._space_kernels.allocate(nv, n, c, m=m)
-        self._at = self._robot.workspace()
+    def _allocate(self, frames: list[str]) -> None:
+        robot, options = self._robot, self.options
+        nv, n, c, m = self._sizes
+        self._terms = robot.workspace().terms
+        self._seen = (
+            *robot.frame_mounts(frames), np.zeros((len(frames), 6, nv)),
+            np.zeros((len(frames), 3, 3)), np.zeros((len(frames), 3)), np.zeros((len(frames), 6)),
+        )  # fmt: skip
         self._J_t, self._J_s = np.zeros((m, nv)), np.zeros((c, nv))
         self._error, self._offset, self._wanted = np.zeros(m), np.zeros(m), np.zeros(m)
-        self._rest, self._motion, self._none = np.zeros(nv), np.zeros(nv), np.zeros(n)
-        self._along = np.zeros((nv, n))
+        self._motion, self._along = np.zeros(nv), np.zeros((nv, n))
+        self._planned_gravity, self._unused = np.zeros(n), np.zeros(n)
         self._sag, self._step, self._square = np.zeros(n), np.zeros(n), np.zeros((n, n))
         self._theta, self._last = np.zeros(n), 0.0
         self._tank = EnergyTank(
@@ -199,7 +211,7 @@ class Controller:
         """U_g of the measured configuration and ∫ ḡᵀ dq_j from there to the fed-back one."""
         away, unused = joints - measurement.q_joint, np.zeros(self._robot.n)
         self._solve(measurement.q)
-        work = float(self._at.potential_energy)
+        work = float(self._terms[10][1])
         for place, weight in _GAUSS:
             self._law(measurement, measurement.q_joint + place * away, unused)
             work += weight * float(self._space.gravity @ away)
@@ -215,52 +227,33 @@ class Controller:
 
     def _solve(self, q: Array) -> None:
         """Evaluate J*, S, ḡ and the task errors at a configuration."""
-        at = self._at
-        at.update(q, self._rest)
-        for frame, place, rows in self._contacts:
-            self._J_s[place] = at.frame_jacobian(frame)[:rows]
-        self._reader.jacobian(at, self._J_t)
-        good = self._space_kernels.operational_space(
-            at.M, at.nle, self._J_s, self._J_t, self._K_x, self._levels,
-            self._form, self._star, RANK_TOLERANCE, self._space,
+        self._evaluate(q, self._robot.joint_positions(q), self._unused)
+
+    def _evaluate(self, q: Array, joints: Array, out: Array) -> None:
+        """Evaluate them, and the torque, at a configuration moved to given joint angles."""
+        good = self._kernel.law(
+            self._robot.tree, self._terms, self._seen, self._tasks, self._gains,
+            (q, joints, self._along, self._offset),
+            (self._J_s, self._J_t, self._error, self._wanted, out), self._memory, self._sizes,
         )  # fmt: skip
         if not good:
             raise RobotError(f"The mass matrix of {self._robot.name} is not positive definite.")
-        self._reader.error(at, q, self._error)
-        self._error += self._offset
-        self._wanted[:] = self._offset
-        if self._consistent:
-            self._leave_to_higher(self._error)
-            self._leave_to_higher(self._wanted)
 
-    def _leave_to_higher(self, error: Array) -> None:
-        """Take out of errors, or rates, of the tasks what the tasks above will do."""
+    def _leave_to_higher(self, rate: Array) -> None:
+        """Take out of the tasks' rates what the tasks above will do."""
         if len(self._levels) > 2:
-            self._law_kernels.leave_to_higher(
-                self._J_t, self._space.lift, self._levels, error, self._motion
+            self._kernel.leave_to_higher(
+                self._J_t, self._space.lift, self._levels, rate, self._motion
             )
 
-    @property
-    def _gravity(self) -> Array:
-        match self.options.gravity:
-            case GravityCompensation.FEEDBACK:
-                return self._space.gravity
-            case GravityCompensation.PLANNED:
-                return self._planned_gravity
-            case _:
-                return self._none
-
     def _torque(self, out: Array) -> None:
-        space = self._space
-        self._space_kernels.task_torque(
-            space.J_star, space.stiffness, self._error, self._gravity, out
-        )
+        space, fed_back = self._space, self.options.gravity is GravityCompensation.FEEDBACK
+        gravity = space.gravity if fed_back else self._planned_gravity
+        self._kernel.task_torque(space.J_star, space.stiffness, self._error, gravity, out)
 
     def _law(self, measurement: Measurement, joints: Array, out: Array) -> None:
         """The law l at given joint angles."""
-        shift = self._along @ (joints - measurement.q_joint)
-        self._solve(self._robot.integrate(measurement.q, shift))
-        self._torque(out)
+        self._evaluate(measurement.q, joints, out)
 
     def _static_law(
         self, measurement: Measurement, sag: Array, iterations: int, out: Array
@@ -273,7 +266,7 @@ class Controller:
         K, space, step = self._actuators.spring_stiffness, self._space, self._step
         for _ in range(iterations):
             self._law(measurement, measurement.theta + sag, out)
-            exists = self._law_kernels.static_step(
+            exists = self._kernel.static_step(
                 space.J_star, space.stiffness, K, out, sag, self._square, step
             )
             size = float(np.abs(step).max())
@@ -310,15 +303,3 @@ class Controller:
         self._theta[:], self._last = measurement.theta, t
         self._error[:] = self._wanted - tank.position
         self._torque(out)
-
-
-def _contact_rows(
-    robot: Robot, contacts: tuple[Contact, ...]
-) -> tuple[list[tuple[str, slice, int]], int]:
-    """Each contact's frame, its place in J_s and its number of rows; and the rows of all."""
-    places, first = [], 0
-    for contact in contacts:
-        last = first + contact.kind.rows
-        places.append((robot.check_frame(contact.frame), slice(first, last), contact.kind.rows))
-        first = last
-    return places, first

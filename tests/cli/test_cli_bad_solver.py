@@ -1,0 +1,148 @@
+"""A solver that stops early, lies or forgets ends in `not_certified` with its own words."""
+
+import functools
+import json
+from dataclasses import replace
+
+import pytest
+
+import sealag
+from helpers.certificates import failures, half_a_step, plain
+from helpers.solvers import LIES, Forgetful, Lying
+from sealag.cli import main
+from sealag.design import save_motion
+from sealag.passivity import ClarabelCvxpy, ClarabelDirect, Criterion
+
+BAD = {
+    "starved": (ClarabelDirect(max_iterations=1), "Clarabel left the bracket open: MaxIterations"),
+    "starved CVXPY": (ClarabelCvxpy(max_iterations=1), "CVXPY + Clarabel left the bracket open"),
+    **{lie: (Lying(change), "a liar left the bracket open: Solved") for lie, change in LIES.items()
+       if lie != "noise"},
+    "forgetful": (Forgetful(0), "a forgetful solver left the bracket open: forgot"),
+}  # fmt: skip
+
+
+def late(system, d_1):
+    """The same design with another constant total delay, s."""
+    plain_delays = replace(system.delays, sample_time=0.0)
+    return replace(system, delays=plain_delays.scaled(d_1 / plain_delays.d_1))
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """Hume under a delay that its bound with one multiplier just covers, and half a step."""
+    system = late(sealag.load("bundled:hume"), 0.115)
+    return system, half_a_step(system)
+
+
+def test_a_good_solver_certifies_both_designs(walk):
+    certificate = sealag.certify(*walk, time_varying=True)
+    assert certificate.status == "certified"
+    assert certificate.left_open == {}
+    assert certificate.delay_s <= certificate.time_varying_delay_s
+    assert sealag.certify(crawl(), criterion="published").status == "certified"
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_solver_of_a_motion_is_not_certified(name, walk):
+    solver, words = BAD[name]
+    certificate = sealag.certify(*walk, solver=solver)
+    assert certificate.status == "not_certified"
+    assert len(certificate.reasons) == 1
+    assert "one multiplier" in certificate.reasons[0]
+    assert words in certificate.reasons[0]
+    assert words in certificate.left_open["common_multiplier_delay_s"]
+    assert certificate.common_multiplier_delay_s < certificate.delay_s <= certificate.max_delay_s
+    assert failures(plain(certificate), exact=True) == []
+
+
+def test_a_bad_solver_of_polytopes_is_not_certified(walk):
+    """The common multiplier is found, then the solver forgets."""
+    good = sealag.certify(*walk)
+    for answers in range(1, 20):
+        certificate = sealag.certify(*walk, time_varying=True, solver=Forgetful(answers))
+        if certificate.common_multiplier_delay_s == good.common_multiplier_delay_s:
+            break
+    assert certificate.status == "not_certified"
+    assert "matrices that move" in certificate.reasons[0]
+    assert set(certificate.left_open) == {"time_varying_delay_s"}
+    assert failures(plain(certificate)) == []
+
+
+def test_a_bad_solver_whose_part_is_enough_costs_nothing(walk):
+    """What one iteration proves is proven: tightness is lost, no truth."""
+    system, motion = walk
+    starved = ClarabelDirect(max_iterations=1)
+    proven = sealag.certify(system, motion, solver=starved).common_multiplier_delay_s
+    certificate = sealag.certify(late(system, 0.99 * proven), motion, solver=starved)
+    assert proven > 0.01
+    assert certificate.status == "certified"
+    assert "common_multiplier_delay_s" in certificate.left_open
+    assert failures(plain(certificate), exact=True) == []
+
+
+def crawl():
+    """Two priority levels under a delay between 1/Σw and the bound of (31)."""
+    return late(sealag.load("examples/anymal_crawl.toml"), 0.095)
+
+
+@pytest.mark.parametrize(
+    ("solver", "words"),
+    [
+        (ClarabelDirect(max_iterations=1), "Clarabel proved too little: MaxIterations"),
+        (Lying(LIES["too large"]), "a liar proved too little: Solved"),
+        (Lying(LIES["not a number"]), "a liar proved too little: Solved"),
+    ],
+)
+def test_a_bad_solver_of_two_levels_is_not_certified(solver, words):
+    certificate = sealag.certify(crawl(), criterion="published", solver=solver)
+    assert certificate.status == "not_certified"
+    assert words in certificate.reasons[0]
+    assert words in certificate.left_open["max_delay_s"]
+    assert certificate.max_delay_s < certificate.delay_s < certificate.max_delay_upper_s
+    assert failures(plain(certificate), exact=True) == []
+
+
+@pytest.mark.parametrize("answers", [1, 0])
+def test_a_bound_without_a_proof_is_withdrawn(answers):
+    """Between bound and multipliers the solver forgets: no error, and no bound."""
+    solver = Forgetful(answers)
+    certificate = sealag.certify(crawl(), criterion=Criterion.PUBLISHED, solver=solver)
+    assert certificate.status == "not_certified"
+    assert "forgot" in " ".join(certificate.reasons)
+    assert (certificate.max_delay_s == 0.0) == (answers == 1)
+    assert failures(plain(certificate)) == []
+
+
+def test_the_command_line_says_it_too(walk, tmp_path, monkeypatch, capsys):
+    system, motion = walk
+    path = tmp_path / "walk.npz"
+    save_motion(motion, system.robot, path)
+    monkeypatch.setattr("sealag.cli._commands.load", lambda project: system)
+
+    def answer(*options):
+        out = tmp_path / "c.json"
+        with pytest.raises(SystemExit) as stop:
+            main(["certify", "bundled:hume", "--motion", str(path), "--out", str(out), *options])
+        return stop.value.code, capsys.readouterr().out
+
+    code, text = answer("--json")
+    assert (code, json.loads(text)["status"]) == (0, "certified")
+    starved = functools.partial(sealag.certify, solver=ClarabelDirect(max_iterations=1))
+    monkeypatch.setattr("sealag.cli._commands.certify", starved)
+    code, text = answer("--json")
+    found = json.loads(text)
+    assert (code, found["status"]) == (1, "not_certified")
+    assert "MaxIterations after 1 iterations" in found["reasons"][0]
+    assert "MaxIterations" in found["left_open"]["common_multiplier_delay_s"]
+    code, text = answer()
+    assert code == 1
+    assert "not certified because it is open whether" in text
+    assert "left open is a longer common_multiplier_delay_s: Clarabel" in text
+
+
+def test_a_forged_yes_is_found(walk):
+    data = plain(sealag.certify(*walk, solver=ClarabelDirect(max_iterations=1)))
+    assert failures(data) == []
+    data.update(status="certified", reasons=[])
+    assert failures(data) == ["verdict"]

@@ -1,0 +1,104 @@
+"""Terms of robots against Pinocchio, which computes them in the bodies' own axes."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sealag.kernels import dynamics
+from sealag.robot import load_robot
+
+ROBOTS = (
+    "bundled:hume.urdf",
+    "example-robot-data:talos_data/robots/talos_reduced.urdf",
+    "example-robot-data:anymal_b_simple_description/robots/anymal.urdf",
+)
+SLIDER = """<robot name="slider">
+<link name="base"><inertial><mass value="2"/><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/>
+<inertia ixx="0.1" iyy="0.2" izz="0.15" ixy="0.01" ixz="0" iyz="0.02"/></inertial></link>
+<link name="cart"><inertial><mass value="1"/><origin xyz="0 0.1 0"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="bob"><inertial><mass value="0.5"/><origin xyz="0 0 -0.4"/>
+<inertia ixx="0.01" iyy="0.02" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/>
+<origin xyz="0.3 0 0" rpy="0.2 0.4 -0.1"/><axis xyz="1 2 -1"/>
+<limit lower="-1" upper="1" effort="9" velocity="9"/></joint>
+<joint name="swing" type="revolute"><parent link="cart"/><child link="bob"/>
+<origin xyz="0 0.2 0.1"/><axis xyz="0.3 1 0.2"/>
+<limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>"""
+
+
+@pytest.fixture(params=[*ROBOTS, "slider"])
+def urdf(request, tmp_path):
+    """A robot's file."""
+    if request.param != "slider":
+        return request.param
+    path = tmp_path / "slider.urdf"
+    path.write_text(SLIDER)
+    return str(path)
+
+
+@pytest.fixture(params=[True, False], ids=["floating", "fixed"])
+def instant(urdf, request):
+    """A robot somewhere far from the origin, moving; our terms and Pinocchio's."""
+    robot, rng = load_robot(urdf, floating_base=request.param), np.random.default_rng(2)
+    model = robot._model
+    q = pin.randomConfiguration(model, np.full(model.nq, -1.0), np.full(model.nq, 1.0))
+    if request.param:
+        q[:3] += 50.0
+    v, data, terms = rng.normal(size=model.nv), model.createData(), dynamics.allocate(robot.tree[0])
+    dynamics.evaluate(robot.tree, q, v, terms)
+    dynamics.evaluate(robot.tree, q, v, terms)  # nothing is left from the first time
+    pin.computeAllTerms(model, data, q, v)
+    return robot, q, v, terms, data
+
+
+def close(ours, theirs):
+    scale = max(1.0, float(np.abs(theirs).max(initial=0.0)))
+    np.testing.assert_allclose(ours, theirs, atol=1e-13 * scale)
+
+
+def test_terms_are_pinocchio_s(instant):
+    robot, q, v, terms, data = instant
+    M, nle, _, R, p, _, _, com, com_jacobian, momentum, energy = terms
+    close(M, data.M)
+    close(nle, data.nle)
+    close(R, [place.rotation for place in data.oMi])
+    close(p, [place.translation for place in data.oMi])
+    close(com[0], data.com[0])
+    close(com[1], data.vcom[0])
+    close(com_jacobian, data.Jcom)
+    close(momentum, data.hg.vector)
+    close(energy, [data.kinetic_energy, data.potential_energy])
+    pin.forwardKinematics(robot._model, data, q, v, np.zeros_like(v))
+    pin.centerOfMass(robot._model, data, pin.KinematicLevel.ACCELERATION)
+    close(com[2], data.acom[0])
+
+
+def test_frames_are_pinocchio_s(instant):
+    """Jacobian, place and J̇ v of every frame, from the joints' terms alone."""
+    robot, q, v, terms, data = instant
+    model, names, nv = robot._model, robot.frame_names(), robot.nv
+    shapes = ((6, nv), (3, 3), (3,), (6,))
+    J, R, p, bias = (np.full((len(names), *shape), np.nan) for shape in shapes)
+    dynamics.frames(terms, robot.frame_mounts(names), J, R, p, bias)
+    pin.updateFramePlacements(model, data)
+    pin.forwardKinematics(model, data, q, v, np.zeros_like(v))
+    pin.computeJointJacobians(model, data, q)
+    at = robot.workspace()
+    at.update(q, v)
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    for f, name in enumerate(names):
+        number = model.getFrameId(name)
+        close(J[f], pin.getFrameJacobian(model, data, number, world))
+        close(R[f], data.oMf[number].rotation)
+        close(p[f], data.oMf[number].translation)
+        close(bias[f], pin.getFrameClassicalAcceleration(model, data, number, world).vector)
+        close(at.frame_velocity(name), pin.getFrameVelocity(model, data, number, world).vector)
+        close(at.frame_jacobian(name), J[f])
+
+
+def test_gravity_torque_is_pinocchio_s(instant):
+    robot, q, v, _, data = instant
+    at = robot.workspace()
+    at.update(q, v)
+    close(at.gravity(), pin.computeGeneralizedGravity(robot._model, data, q))
