@@ -204,7 +204,7 @@ def check_inertias(model: Any, path: Path) -> None:
     links = {f.parentJoint: f.name for f in reversed(model.frames) if f.type == pin.FrameType.BODY}
     for number, body in enumerate(model.inertias[1:], start=1):
         values = np.linalg.eigvalsh(body.inertia)
-        if body.mass < 0.0 or values[0] < -_INDEFINITE * np.abs(values).max():
+        if body.mass < 0.0 or values[0] < -_INDEFINITE * max(values[2], _LEAST_INERTIA):
             raise RobotError(
                 f"{path}: link {links[number]} has, with what is fixed to it, a mass of "
                 f"{body.mass:g} kg and principal inertias {', '.join(f'{v:.3g}' for v in values)} "
