@@ -1,6 +1,7 @@
-"""Writing files whole: under a temporary name, then renamed."""
+"""Reading files whole and within bounds; writing them whole, under a temporary name first."""
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,6 +9,67 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sealag.errors import FileError
+
+
+def read_whole(path: Path, *, what: str, largest: int) -> bytes:
+    """Read a regular file that has at most a given size.
+
+    Args:
+        path: the file.
+        what: what messages call it, such as "the project file".
+        largest: bytes.
+
+    Raises:
+        FileError: it is missing, unreadable, larger, or no regular file.
+    """
+    try:
+        with open(path, "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise FileError(f"{what} {path} is no regular file; give the name of one.")
+            content = file.read(largest + 1)
+    except OSError as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"{what} {path} cannot be read: {error.strerror or error}.") from error
+    except ValueError as error:
+        raise FileError(f"{what} {str(path)!r} cannot be read: {error}.") from error
+    if len(content) > largest:
+        raise FileError(f"{what} {path} is larger than {largest / 1e6:g} MB.")
+    return content
+
+
+def check_output(path: Path, *inputs: Path) -> None:
+    """Refuse to write where something would be lost: over an input, a folder or a device.
+
+    Args:
+        path: where a file is to be written; it need not exist.
+        inputs: files that the command reads.
+
+    Raises:
+        FileError: it is one of the inputs, or exists and is no regular file.
+    """
+    if not path.exists():
+        return
+    if not path.is_file():
+        raise FileError(f"{path} cannot be written: it is no regular file; choose another --out.")
+    for other in inputs:
+        if other.exists() and path.samefile(other):
+            raise FileError(f"{path} would be overwritten, but it is read; choose another --out.")
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder with those above it, if it is not there.
+
+    Args:
+        path: the folder.
+
+    Raises:
+        FileError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"The folder {path} cannot be made: {error.strerror or error}.") from error
 
 
 @contextmanager

@@ -33,6 +33,8 @@ def project(tmp_path, *changes):
     return path
 
 
+SINUSOID = next(line for line in GOOD.splitlines() if line.startswith("central_round_trip"))
+
 CHANGES = {
     "unknown joint": ('right_hip = -0.4363', 'right_hipp = -0.4363', ["right_hipp", "right_hip"]),
     "unknown actuator joint": ("actuators.joint.right_abduction", "actuators.joint.rabd", ["rabd"]),
@@ -59,6 +61,30 @@ CHANGES = {
     "one foot": ('feet = ["left_foot", "right_foot"]', 'feet = ["left_foot"]', ["feet"]),
     "unknown terrain": ('kind = "paper"', 'kind = "moon"', ["terrain", "moon"]),
     "text for number": ("rotor_inertia = 0.093", 'rotor_inertia = "heavy"', ["rotor_inertia"]),
+    "number in quotes": ("rotor_inertia = 0.093", 'rotor_inertia = "0.093"', ["without quotes"]),
+    "true for number": ("motor_damping = 100.0", "motor_damping = true", ["True", "a number"]),
+    "joint in quotes": ("right_hip = -0.4363", 'right_hip = "-0.4363"', ["right_hip"]),
+    "tiny spring": ("spring_stiffness = 350.0", "spring_stiffness = 1e-308", ["Nm/rad", "0.001"]),
+    "hard spring": ("spring_stiffness = 350.0", "spring_stiffness = 1e12", ["Nm/rad", "1e+08"]),
+    "one bad gain": ("stiffness = 50.0", "stiffness = [1, 2, -3]", ["torso", "entry 3", "-3"]),
+    "delay as number": (SINUSOID, "central_round_trip = 8.0", ["central_round_trip", "a table"]),
+    "delay of no kind": ('{ kind = "sinusoid", mean', "{ mean", ["trip.kind", "missing"]),
+    "delay of odd kind": ('kind = "sinusoid"', 'kind = "Constant"', ["'Constant'", "'samples'"]),
+    "short position": ("[0.0, 0.0, 0.87]", "[0.0, 0.87]", ["base_position", "3 entries"]),
+    "long quaternion": ("[posture.joints]", "base_quaternion_xyzw = [0, 0, 0, 2]\n[posture.joints]",
+        ["base_quaternion_xyzw", "length 2"]),
+    "degrees": ("right_knee = 0.9599", "right_knee = 55.0", ["right_knee", "55 degrees", "0.9599"]),
+    "held and fixed": ('base = "floating"', 'base = "fixed"', ["robot.base", "[[contacts]]"]),
+    "contact twice": ('frame = "left_foot"', 'frame = "right_foot"', ["right_foot", "twice"]),
+    "com with a frame": ('kind = "com"', 'kind = "com"\nframe = "torso"', ["centre", "frame"]),
+    "axis twice": ('kind = "com"', 'kind = "com"\naxes = ["x", "x"]', ["centre of mass", "twice"]),
+    "endless burst": (SINUSOID, 'central_round_trip = { kind = "constant", value_ms = 1.0, '
+        "packet_loss = 0.1, max_burst = 1000000000 }\nsample_time_ms = 1.0", ["max_burst", "5 s"]),
+    "no samples": (SINUSOID,
+        'central_round_trip = {kind = "samples", period_s = 1, file = "no.txt"}',
+        ["central_round_trip", "no.txt"]),
+    "no motion": ("[delays]", '[motion]\nfile = "no.csv"\n[delays]', ["motion.file", "no.csv"]),
+    "folder for URDF": ("bundled:hume.urdf", ".", ["robot", "Is a directory"]),
 }  # fmt: skip
 
 
@@ -88,6 +114,54 @@ def test_huge_and_missing_projects(tmp_path, capsys):
     assert "hume" in fails(capsys, "certify", "bundled:humee")
 
 
+def test_project_with_byte_order_mark_is_read(tmp_path):
+    path = project(tmp_path)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert load(path).robot.name == load("bundled:hume").robot.name
+
+
+SAMPLES = {
+    "empty": ("\n", "empty"),
+    "two columns": ("8.0\n0.1 8.0\n", "line 2"),
+    "seconds or worse": ("1e4\n", "5 s"),
+}
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_samples_problem_is_named(name, tmp_path, capsys):
+    samples = 'central_round_trip = { kind = "samples", file = "s.txt", period_s = 0.01 }'
+    path = project(tmp_path, (SINUSOID, samples))
+    (tmp_path / "s.txt").write_text("\ufeff8.0\n\n9.5\n")
+    assert load(path).delays.central.upper_bound == pytest.approx(9.5e-3)
+    text, word = SAMPLES[name]
+    (tmp_path / "s.txt").write_text(text)
+    err = fails(capsys, "certify", path)
+    assert "p.toml: delays.central_round_trip" in err
+    assert word in err
+
+
+def body(mass="1", ixx="0.01"):
+    return (
+        f'<link name="b"><inertial><mass value="{mass}"/><origin xyz="0 0 .1"/><inertia ixx="{ixx}"'
+        ' iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    )
+
+
+def arm(link=None, *, kind="revolute", limit='lower="-1" upper="1"', more=""):
+    inner = f'<limit {limit} effort="1" velocity="1"/>' if limit else ""
+    return (
+        f'<robot name="r"><link name="a"/>{body() if link is None else link}'
+        f'<joint name="j" type="{kind}"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>'
+        f"{inner}</joint>{more}</robot>"
+    )
+
+
+FINGER = (
+    body().replace('"b"', '"c"')
+    + '<joint name="k" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="j"/></joint>'
+)
+
 URDFS = {
     "empty": ("", "empty"),
     "not XML": ("<robot", "XML"),
@@ -102,8 +176,19 @@ URDFS = {
     "dangling joint": (
         '<robot name="r"><link name="a"/><joint name="j" type="revolute">'
         '<parent link="a"/><child link="b"/></joint></robot>',
-        "",
+        "j",
     ),
+    "text for a mass": (arm(body(mass="heavy")), "heavy"),
+    "comma in a mass": (arm(body(mass="1,5")), "Link [b]"),
+    "NaN inertia": (arm(body(ixx="nan")), "ixx"),
+    "negative inertia": (arm(body(ixx="-1")), "link b"),
+    "almost no inertia": (arm(body(mass="1e-12", ixx="1e-15").replace("0.01", "1e-15")), "joint j"),
+    "no limit": (arm(limit=""), "limits"),
+    "limits swapped": (arm(limit='lower="1" upper="-1"'), "lower"),
+    "odd type": (arm(kind="hinge"), "hinge"),
+    "zero axis": (arm().replace("0 1 0", "0 0 0"), "axis of joint j"),
+    "link twice": (arm(more='<link name="a"/>'), "not unique"),
+    "xacro": (arm(more='<x:if xmlns:x="http://ros.org/wiki/xacro"/>'), "xacro"),
 }
 
 
@@ -116,6 +201,17 @@ def test_urdf_problem_is_named(name, tmp_path, capfd):
     assert "r.urdf" in err
     assert word in err
     assert not (tmp_path / "o.toml").exists()
+
+
+def test_good_arm_is_not_refused_and_mimics_are_locked(tmp_path):
+    from sealag.errors import RobotError
+    from sealag.robot import load_robot
+
+    path = tmp_path / "r.urdf"
+    path.write_text(arm(more=FINGER))
+    assert load_robot(path, floating_base=False).joints == ("j",)
+    with pytest.raises(RobotError, match="k mimics j"):
+        load_robot(path, floating_base=False, actuated=["j", "k"])
 
 
 @pytest.fixture(scope="module")
@@ -147,6 +243,10 @@ MOTIONS = {
     "NaN row": (spoil_nan, "row 4"),
     "quaternion": (spoil_quaternion, "quaternion"),
     "time": (spoil_time, "increase"),
+    "joint limit": (lambda t: {**t, "left_knee": t["left_knee"] + 55.0}, "left_knee"),
+    "half a contact": (lambda t: {**t, "contact:left_foot": 0.5 + 0.0 * t["time_s"]}, "0 or 1"),
+    "some velocities": (lambda t: {k: v for k, v in t.items() if k != "base_vx"}, "base_vx"),
+    "complex": (lambda t: {**t, "left_knee": t["left_knee"] * 1j}, "complex"),
     "lengths": (lambda t: {**t, "left_knee": t["left_knee"][:-1]}, "length"),
 }
 
@@ -171,6 +271,44 @@ def test_motion_files_that_are_none(tmp_path, capsys):
     assert "e.csv" in fails(capsys, "certify", "bundled:hume", "--motion", tmp_path / "e.csv")
 
 
+CSVS = {
+    "comment": (lambda lines: [lines[0], "#" + lines[1], *lines[2:]], "row 1"),
+    "text": (lambda lines: [*lines[:3], "a" + lines[3]], "row 3"),
+    "short row": (lambda lines: [*lines[:3], lines[3].rpartition(",")[0]], "row 3"),
+    "semicolons": (lambda lines: [line.replace(",", ";") for line in lines], "semicolons"),
+    "no names": (lambda lines: lines[1:], "column names"),
+    "no rows": (lambda lines: lines[:1], "no rows"),
+    "name twice": (lambda lines: [line + "," + line.split(",")[0] for line in lines], "twice"),
+}
+
+
+@pytest.mark.parametrize("name", CSVS)
+def test_csv_problem_is_named(name, walk, tmp_path, capsys):
+    from sealag.design import load_motion
+
+    system, motion = walk
+    path = tmp_path / "m.csv"
+    save_motion(motion, system.robot, path)
+    good = path.read_text()
+    path.write_text("\ufeff" + good.replace("\n", "\r\n"))
+    assert len(load_motion(path, system.robot, contacts=system.contacts)) == len(motion)
+    spoil, word = CSVS[name]
+    path.write_text("\n".join(spoil(good.splitlines())))
+    err = fails(capsys, "certify", "bundled:hume", "--motion", path)
+    assert "m.csv" in err
+    assert word in err
+
+
+def test_nothing_read_is_overwritten(tmp_path, capsys):
+    path = project(tmp_path)
+    before = path.read_text()
+    for command in ("certify", "simulate"):
+        for out in (path, tmp_path / "." / "p.toml", tmp_path, "/dev/null"):
+            assert str(out) in fails(capsys, command, path, "--json", "--out", out)
+    assert path.read_text() == before
+    assert "regular" in fails(capsys, "certify", "/dev/zero")
+
+
 def test_unwritable_output(tmp_path, capsys, walk):
     blocked = tmp_path / "file"
     blocked.write_text("")
@@ -182,6 +320,56 @@ def test_unwritable_output(tmp_path, capsys, walk):
 def test_wrong_options(capsys, tmp_path):
     assert "criterion" in fails(capsys, "certify", "bundled:hume", "--criterion", "maybe")
     assert "cannot be read" in fails(capsys, "verify", tmp_path / "none.json")
+
+
+USAGE = {
+    "unknown command": (["frobnicate"], "frobnicate"),
+    "unknown option": (["certify", "bundled:hume", "--nope"], "--nope"),
+    "missing argument": (["certify"], "sealag certify --help"),
+    "text for a number": (["simulate", "bundled:hume", "--seed", "x"], "--seed"),
+    "negative seed": (["simulate", "bundled:hume", "--seed", "-1"], "seed is -1"),
+    "no scenario": (["simulate", "bundled:hume", "--scenario", ""], "scenario is ''"),
+    "no end": (["simulate", "bundled:hume", "--duration", "1e300"], "1e9 s"),
+    "no memory": (["simulate", "bundled:hume", "--duration", "1e8"], "GB"),
+    "late": (["simulate", "bundled:hume", "--delay-scale", "1e9"], "--delay-scale"),
+    "early": (["simulate", "bundled:hume", "--delay-scale", "-1"], "--delay-scale"),
+    "no horizon": (["margin", "bundled:hume", "--horizon-ms", "1e300"], "--horizon-ms"),
+    "device": (["verify", "/dev/zero"], "regular"),
+    "no folder": (["paper", "--out", "/dev/null"], "cannot be made"),
+    "one instant": (["certify", "bundled:hume", "--time-varying"], "more than one instant"),
+}
+
+
+@pytest.mark.parametrize("name", USAGE)
+def test_usage_problem_is_one_sentence(name, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments, word = USAGE[name]
+    assert word in fails(capsys, *arguments)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pushes_that_do_not_act_are_refused(tmp_path, capsys):
+    push = '[[simulation.pushes]]\nframe = "torso"\nforce_n = [1.0, 0.0, 0.0]\n{}\n[delays]'
+    for times, word in (
+        ("start_s = 5.0\nduration_s = 0.1", "ends at"),
+        ("start_s = 0.01\nduration_s = 1e-5", "physics step"),
+    ):
+        path = project(tmp_path, ("[delays]", push.format(times)))
+        err = fails(capsys, "simulate", path, "--scenario", "regulate", "--duration", "0.05")
+        assert "torso" in err
+        assert word in err
+    path = project(tmp_path, ("[delays]", push.format("start_s = 0.001\nduration_s = 0.1")))
+    with pytest.raises(SystemExit) as stop:
+        out = str(tmp_path / "o.mcap")
+        main(["simulate", str(path), "--scenario", "drop", "--duration", "0.002", "--out", out])
+    assert stop.value.code == 0
+
+
+def test_help_is_shown_without_a_command(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([])
+    assert stop.value.code == 0
+    assert "certify" in capsys.readouterr().out
 
 
 def test_saved_motion_comes_back(walk, tmp_path):

@@ -137,5 +137,6 @@ def test_a_loop_that_gains_stability_before_its_first_crossing_is_no_contradicti
     data = plain(certificate)
     assert data["unstable_modes"] == 2
     count = [c for c in verify(data).checks if c.name == "no root crosses before"]
-    assert count[0].ok and "-2" in count[0].detail
+    assert count[0].ok
+    assert "-2" in count[0].detail
     assert failures(data) == []

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.exceptions import TyperException
 
 from sealag import __version__
 from sealag.errors import SealagError
@@ -20,7 +21,6 @@ app = typer.Typer(
     help="How much network delay a robot with springs in its joints tolerates.",
     epilog="Exit status: 0 done, 1 the answer is no (not certified, certificate does not hold), "
     "2 the input is wrong, 130 interrupted.",
-    no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -234,15 +234,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
         arguments: what follows the program's name; the process's own if None.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        app(args=None if arguments is None else list(arguments), prog_name="sealag")
+        status = app(args=words, prog_name="sealag", standalone_mode=False)
     except SealagError as error:
-        print(f"sealag: {error}", file=sys.stderr)
+        line = str(error).replace("\n", "\\n")
+        print(f"sealag: {line}", file=sys.stderr)
         raise SystemExit(2) from None
-    except SystemExit as end:
-        if end.code == INTERRUPTED:
-            print("sealag: interrupted", file=sys.stderr)
-        raise
+    except TyperException as error:
+        known = {
+            command.callback.__name__ for command in app.registered_commands if command.callback
+        }
+        asked = f"{words[0]} " if words[0] in known else ""
+        problem = error.format_message().rstrip(".")
+        print(f"sealag: {problem}; see sealag {asked}--help.", file=sys.stderr)
+        raise SystemExit(2) from None
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(0) from None
+    if status == INTERRUPTED:
+        print("sealag: interrupted", file=sys.stderr)
+    raise SystemExit(status or 0)

@@ -12,11 +12,12 @@ import numpy as np
 from sealag.cli._app import show_json
 from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
 from sealag.errors import FileError, InputError
-from sealag.files import write_text
+from sealag.files import check_output, make_folder, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms
 
+LONGEST_HORIZON_MS = 1e6
 LARGEST_LIST = 250
 """Checks that hold and are shown one by one."""
 
@@ -25,6 +26,7 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     """Write a starter project; an existing file is not overwritten."""
     stem = Path(urdf.rsplit(":", 1)[-1]).stem
     path = out or Path(f"{stem}.toml")
+    check_output(path)
     if path.exists():
         raise FileError(f"{path} exists already; choose another name with --out.")
     named = urdf
@@ -65,7 +67,10 @@ def certify_project(
         raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
     if proofs != "all" and not (proofs.isascii() and proofs.isdigit() and int(proofs) > 0):
         raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
+    path = out or Path(f"{resolve_project(project).stem}.certificate.json")
+    check_output(path, resolve_project(project), *([motion] if motion else []))
     system = load(project)
+    check_output(path, *system.files)
     with _busy("certifying"):
         certificate = certify(
             system,
@@ -74,7 +79,6 @@ def certify_project(
             time_varying=time_varying,
             proofs=None if proofs == "all" else int(proofs),
         )
-    path = out or Path(f"{resolve_project(project).stem}.certificate.json")
     write_certificate(certificate, path)
     if as_json:
         show_json(certificate.summary())
@@ -141,6 +145,11 @@ def margin_project(
     """Show the exact local margin at every instant, or at a sample of a long motion."""
     from sealag.design import local_margins
 
+    if horizon_ms is not None and not 0.0 < horizon_ms <= LONGEST_HORIZON_MS:
+        raise InputError(
+            f"--horizon-ms is {horizon_ms:g}; it must be more than 0 and at most "
+            f"{LONGEST_HORIZON_MS:g}."
+        )
     system = load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
     with _busy("computing margins"):
@@ -194,6 +203,7 @@ def write_paper(out: Path, *, as_json: bool) -> None:
     """Compute and write the paper page."""
     from sealag.cli._paper import make_paper
 
+    make_folder(out)
     answer = make_paper(out, progress=lambda text: print(text, file=sys.stderr, flush=True))
     if as_json:
         show_json(answer)

@@ -10,7 +10,8 @@ import numpy as np
 import sealag
 from sealag.cli._app import show_json
 from sealag.design import System, load, resolve_project, scenario_duration, simulate
-from sealag.errors import FileError, InputError
+from sealag.errors import InputError
+from sealag.files import check_output
 from sealag.paper import WalkCase, measure_walk
 from sealag.report import write_run
 from sealag.simulation import Outcome, Passivity, Run
@@ -32,12 +33,16 @@ def simulate_project(
 ) -> None:
     """Run a scenario with a progress bar, write the recording and show the audit."""
     path = out or Path(f"{resolve_project(project).stem}.mcap")
-    if path.is_dir():
-        raise FileError(f"--out is {path}, a folder; give the recording a file name in it.")
+    check_output(path, resolve_project(project))
     system = load(project)
+    check_output(path, *system.files)
     length = scenario_duration(system, scenario) if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"--duration is {length}; a positive time in s is needed.")
+    try:
+        system.delays.scaled(delay_scale)
+    except InputError as error:
+        raise InputError(f"--delay-scale is {delay_scale:g}: {error}") from error
     run = _with_progress(
         "simulating",
         length,
@@ -52,7 +57,7 @@ def simulate_project(
     )
     _record(run, system, path)
     answer = summary(run, path)
-    if (scenario or system.simulation.scenario) == "walk":
+    if (system.simulation.scenario if scenario is None else scenario) == "walk":
         answer |= gait_summary(system, run)
     if as_json:
         show_json(answer)

@@ -7,7 +7,7 @@ from sealag.delay._line import Link, PacketOrder
 from sealag.delay._signal import DelaySignal, Share
 from sealag.errors import InputError
 from sealag.typing import Array
-from sealag.units import check_delay_s
+from sealag.units import LONGEST_DELAY_S, check_delay_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +104,8 @@ class Delays:
             embedded connection; the criterion assumes that it does not.
 
     Raises:
-        InputError: a period cannot be one, or packets without a period are lost.
+        InputError: a period cannot be one, packets without a period are lost, or all together is
+            longer than LONGEST_DELAY_S.
     """
 
     central: RoundTrip
@@ -137,7 +138,11 @@ class Delays:
                 f"The embedded period {embedded_period:g} s is longer than the central one, "
                 f"{sample_time:g} s."
             )
-        _ = self.d_1
+        if self.d_1 > LONGEST_DELAY_S:
+            raise InputError(
+                f"The delays add up to d_1 = {self.d_1:g} s, longer than {LONGEST_DELAY_S:g} s; "
+                "shorten delays, jitter, periods or bursts of lost packets (max_burst)."
+            )
 
     @property
     def d_0(self) -> float:

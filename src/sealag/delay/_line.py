@@ -11,6 +11,7 @@ from sealag.errors import InputError
 from sealag.typing import Array
 
 _BLOCK = 1024
+_LARGEST = 125_000_000  # numbers on their way
 
 
 class PacketOrder(StrEnum):
@@ -116,7 +117,7 @@ class DelayLine:
         rng: Source of the jitter and the losses; a seeded generator makes a run repeatable.
 
     Raises:
-        InputError: A period is not positive.
+        InputError: A period is not positive, or the packets on their way do not fit into memory.
     """
 
     __slots__ = (
@@ -139,6 +140,11 @@ class DelayLine:
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"{name} must be a finite time > 0 s, got {value}")
         capacity = 4 + math.ceil((link.age_bound(period) + receive_period) / period)
+        if capacity * width > _LARGEST:
+            raise InputError(
+                f"A link holds {capacity} packets on their way at one every {period:g} s, more "
+                "than fit into 1 GB of memory; lengthen its period or shorten its delay."
+            )
         self._link, self._period, self._rng = link, period, rng
         self._arrival = np.full(capacity, np.inf)
         self._values = np.zeros((capacity, width))

@@ -208,7 +208,7 @@ class Share:
         """Check the fraction."""
         if not (math.isfinite(self.fraction) and self.fraction >= 0.0):
             raise InputError(
-                f"The share of a delay is {self.fraction}; 0 or a positive number is needed."
+                f"A factor on a delay is {self.fraction}; 0 or a positive number is needed."
             )
 
     @property

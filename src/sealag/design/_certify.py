@@ -20,7 +20,7 @@ from sealag.design._evidence import (
     worst_motion,
 )
 from sealag.design._system import System
-from sealag.errors import InputError
+from sealag.errors import InputError, either
 from sealag.passivity import Certificate, Criterion, Solver, Status, Worst
 from sealag.robot import Motion
 from sealag.whole_body import (
@@ -64,14 +64,13 @@ def certify(
         The certificate; not certified is a result, not an error.
 
     Raises:
-        InputError: fewer than one proof is asked for.
+        InputError: fewer than one proof is asked for, the criterion or the motion is none, or a
+            time-varying bound is asked of one instant or of the published criterion.
         RobotError: a mass matrix is not positive definite.
         UnknownNameError: a frame or joint does not exist.
     """
-    if proofs is not None and proofs < 1:
-        raise InputError(f"proofs is {proofs}; the worst instant at least needs its numbers.")
     motion = system.still() if motion is None else motion
-    kind = system.criterion if criterion is None else Criterion(criterion)
+    kind = _criterion(system, motion, criterion, time_varying=time_varying, proofs=proofs)
     stack = system.evaluate(motion)
     published = published_bounds(stack, system, solver=solver)
     printed = kind is Criterion.PUBLISHED
@@ -112,6 +111,30 @@ def certify(
             **{name: version(name) for name in ("numpy", "scipy", "numba", "pin")},
         },
     )
+
+
+def _criterion(
+    system: System,
+    motion: Motion,
+    criterion: Criterion | str | None,
+    *,
+    time_varying: bool,
+    proofs: int | None,
+) -> Criterion:
+    """The criterion that is asked for, if the question has an answer."""
+    if not isinstance(motion, Motion):
+        raise InputError(f"motion is {motion!r}; load_motion makes a Motion of a file.")
+    if proofs is not None and not (isinstance(proofs, int) and proofs >= 1):
+        raise InputError(f"proofs is {proofs!r}; it must be a whole number from 1 up, or None.")
+    name = system.criterion if criterion is None else criterion
+    if name not in set(Criterion):
+        raise InputError(f"criterion is {name!r}; it must be {either(list(Criterion))}.")
+    if time_varying and (name == Criterion.PUBLISHED or len(motion) < 2):
+        raise InputError(
+            "A time-varying bound needs the certified criterion and a motion of more than one "
+            "instant (--motion)."
+        )
+    return Criterion(name)
 
 
 def design_entries(system: System) -> dict[str, Any]:

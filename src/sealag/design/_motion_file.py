@@ -1,20 +1,24 @@
 """Motions as tables with named columns: CSV, NPZ or Parquet."""
 
+import csv
+import io
+import zipfile
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from sealag.errors import FileError, MotionError
-from sealag.files import written_whole
-from sealag.robot import Contact, Motion, Robot
+from sealag.errors import InputError, MotionError
+from sealag.files import read_whole, written_whole
+from sealag.robot import UNIT_TOLERANCE, Contact, Motion, Robot, require_within_limits
 from sealag.typing import Array
 
 BASE_COLUMNS = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 BASE_RATES = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
 CONTACT = "contact:"
 VELOCITY = ":velocity"
+LARGEST_BYTES = 2_000_000_000
 
 
 def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] = ()) -> Motion:
@@ -35,8 +39,9 @@ def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] =
 
     Raises:
         FileError: the file cannot be read.
-        MotionError: a column is unknown or missing, a row is not finite, time does not increase,
-            or a quaternion is not one.
+        MotionError: a column is unknown, missing or holds no real numbers, a row is not finite,
+            time does not increase, a quaternion is not one, a joint is outside its limits, a
+            contact is neither 0 nor 1, or only some velocities are given.
     """
     path = Path(path)
     table = _read_table(path)
@@ -51,35 +56,55 @@ def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] =
     missing = [name for name in needed if name not in table]
     if missing:
         raise MotionError(f"{path}: the column {missing[0]} is missing ({len(missing)} in all).")
-    lengths = {len(column) for column in table.values()}
-    if len(lengths) != 1 or lengths == {0}:
-        raise MotionError(f"{path}: the columns must have one common length of at least 1.")
-    for name, column in table.items():
-        if not np.isfinite(column).all():
-            row = int((~np.isfinite(column)).argmax())
-            raise MotionError(f"{path}: the column {name} is {column[row]} in row {row + 1}.")
+    _check_rows(table, path)
     q = np.column_stack([table[name] for name in needed[1:]])
     time = table["time_s"]
-    if (np.diff(time) <= 0.0).any():
-        row = int((np.diff(time) <= 0.0).argmax()) + 2
-        raise MotionError(f"{path}: time_s does not increase in row {row}.")
     if robot.floating_base:
-        norm = np.linalg.norm(q[:, 3:7], axis=1)
-        if (np.abs(norm - 1.0) > 1e-3).any():
-            row = int((np.abs(norm - 1.0) > 1e-3).argmax())
-            raise MotionError(
-                f"{path}: the base quaternion of row {row + 1} has length {norm[row]:.4g}; 1 is "
-                "right (columns base_qx, base_qy, base_qz, base_qw)."
-            )
-        q[:, 3:7] /= norm[:, None]
+        q[:, 3:7] = _unit(q[:, 3:7], path)
+    try:
+        require_within_limits(robot, q)
+    except InputError as error:
+        raise MotionError(f"{path}: {error}") from error
     sets, index = _contact_sets(table, contacts)
     return Motion(
         time=time,
         q=q,
-        v=_velocities(table, robot, time, q),
+        v=_velocities(table, robot, q, path=path),
         contact_sets=sets,
         contact_index=index,
     )
+
+
+def _check_rows(table: dict[str, Array], path: Path) -> None:
+    """Refuse rows that are no numbers, times that do not increase, and half a contact."""
+    if len({len(column) for column in table.values()}) != 1:
+        raise MotionError(f"{path}: the columns must have one common length.")
+    for name, column in table.items():
+        if not len(column):
+            raise MotionError(f"{path} has no rows below its column names; at least one is needed.")
+        bad, need = ~np.isfinite(column), "a finite number"
+        if name == "time_s":
+            bad[1:] |= np.diff(column) <= 0.0
+            need = "more than in the row before: time must increase"
+        elif name.startswith(CONTACT):
+            bad, need = (column != 0.0) & (column != 1.0), "0 or 1"
+        if bad.any():
+            row = int(bad.argmax())
+            raise MotionError(
+                f"{path}: the column {name} is {column[row]:g} in row {row + 1}; it must be {need}."
+            )
+
+
+def _unit(quaternions: Array, path: Path) -> Array:
+    norm = np.linalg.norm(quaternions, axis=1)
+    bad = np.abs(norm - 1.0) > UNIT_TOLERANCE
+    if bad.any():
+        row = int(bad.argmax())
+        raise MotionError(
+            f"{path}: the base quaternion of row {row + 1} has length {norm[row]:.4g}; 1 is "
+            "right (columns base_qx, base_qy, base_qz, base_qw)."
+        )
+    return quaternions / norm[:, None]
 
 
 def _known_columns(robot: Robot, contacts: Sequence[Contact]) -> set[str]:
@@ -89,47 +114,101 @@ def _known_columns(robot: Robot, contacts: Sequence[Contact]) -> set[str]:
 
 
 def _read_table(path: Path) -> dict[str, Array]:
+    ending = path.suffix.lower()
+    if ending not in _READERS:
+        raise MotionError(
+            f"{path}: motions end in .csv, .npz or .parquet, not {ending or 'nothing'!r}."
+        )
+    content = read_whole(path, what="The motion", largest=LARGEST_BYTES)
     try:
-        match path.suffix.lower():
-            case ".csv":
-                return _read_csv(path)
-            case ".npz":
-                with np.load(path, allow_pickle=False) as data:
-                    return {name: np.asarray(data[name], dtype=float).ravel() for name in data}
-            case ".parquet":
-                from pyarrow import parquet
-
-                found = parquet.read_table(path)
-                return {name: found[name].to_numpy().astype(float) for name in found.column_names}
-            case ending:
-                raise MotionError(
-                    f"{path}: motions end in .csv, .npz or .parquet, not {ending or 'nothing'!r}."
-                )
+        table = _READERS[ending](content, path)
     except MotionError:
         raise
-    except OSError as error:
-        raise FileError(f"The motion {path} cannot be read: {error.strerror or error}.") from error
     except Exception as error:
-        raise MotionError(f"{path} cannot be read as a motion: {error}.") from error
+        reason = " ".join(str(error).split())[:200].rstrip(".")
+        raise MotionError(f"{path} cannot be read as a motion: {reason}.") from error
+    return {name: _column(values, name, path) for name, values in table.items()}
 
 
-def _read_csv(path: Path) -> dict[str, Array]:
-    with open(path, encoding="utf-8") as file:
-        names = [name.strip() for name in file.readline().strip().split(",")]
-        if len(set(names)) < len(names):
-            raise MotionError(f"{path}: a column name occurs twice.")
-        rows = [row for row in file if row.strip()]
-    values = np.genfromtxt(rows, delimiter=",", ndmin=2) if rows else np.zeros((0, 0))
-    if values.size == 0 or values.shape[1] != len(names):
-        raise MotionError(f"{path}: the rows do not have the {len(names)} columns of the head.")
-    return dict(zip(names, values.T, strict=True))
+def _column(values: Array, name: str, path: Path) -> Array:
+    """A column as doubles, (N,)."""
+    rows = max(values.shape, default=1)
+    if values.dtype.kind not in "fiub" or values.size != rows:
+        raise MotionError(
+            f"{path}: the column {name} has type {values.dtype} and shape {values.shape}; one real "
+            "number a row is needed."
+        )
+    return values.astype(float).ravel()
 
 
-def _velocities(table: dict[str, Array], robot: Robot, time: Array, q: Array) -> Array:
+def _read_npz(content: bytes, path: Path) -> dict[str, Array]:
+    if not zipfile.is_zipfile(io.BytesIO(content)):
+        raise MotionError(f"{path} is not an NPZ file of named columns; np.savez writes one.")
+    data = np.load(io.BytesIO(content), allow_pickle=False)
+    return {name: data[name] for name in data}
+
+
+def _read_parquet(content: bytes, path: Path) -> dict[str, Array]:
+    import pyarrow
+    from pyarrow import parquet
+
+    found = parquet.read_table(pyarrow.BufferReader(content))
+    return {name: found[name].to_numpy() for name in found.column_names}
+
+
+def _read_csv(content: bytes, path: Path) -> dict[str, Array]:
+    lines = csv.reader(content.decode("utf-8-sig").splitlines(), strict=True)
+    names = [name.strip() for name in next(lines, [])]
+    if not names or _number(names[0]) is not None:
+        raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
+    if ";" in names[0]:
+        raise MotionError(f"{path} has semicolons between its cells; commas are right.")
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise MotionError(f"{path}: the column name {twice[0]!r} occurs twice.")
+    rows: list[list[float]] = []
+    for cells in lines:
+        if not cells:
+            continue
+        numbers = [_number(cell) for cell in cells]
+        if len(cells) != len(names):
+            raise MotionError(
+                f"{path}: row {len(rows) + 1} has {len(cells)} cells, but there are {len(names)} "
+                "column names; cells are separated by commas, decimals by points."
+            )
+        if None in numbers:
+            at = numbers.index(None)
+            raise MotionError(
+                f"{path}: the column {names[at]} is {cells[at]!r} in row {len(rows) + 1}; it must "
+                "be a number."
+            )
+        rows.append([number for number in numbers if number is not None])
+    columns = np.array(rows, dtype=float).reshape(-1, len(names)).T
+    return dict(zip(names, columns, strict=True))
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+_READERS = {".csv": _read_csv, ".npz": _read_npz, ".parquet": _read_parquet}
+
+
+def _velocities(table: dict[str, Array], robot: Robot, q: Array, *, path: Path) -> Array:
     names = [*(BASE_RATES if robot.floating_base else ()), *(j + VELOCITY for j in robot.joints)]
-    if all(name in table for name in names):
+    missing = [name for name in names if name not in table]
+    if not missing:
         return np.column_stack([table[name] for name in names])
-    v = np.zeros((len(time), robot.nv))
+    given = [name for name in names if name in table]
+    if given:
+        raise MotionError(
+            f"{path}: the velocity {given[0]} is given without {missing[0]}; give all velocities, "
+            "or none, then they are differences of the positions."
+        )
+    time, v = table["time_s"], np.zeros((len(q), robot.nv))
     if len(time) > 1:
         steps = np.array([robot.difference(a, b) for a, b in pairwise(q)])
         rates = steps / np.diff(time)[:, None]
@@ -145,7 +224,7 @@ def _contact_sets(
     on = np.ones((count, len(contacts)), dtype=bool)
     for k, contact in enumerate(contacts):
         if CONTACT + contact.frame in table:
-            on[:, k] = table[CONTACT + contact.frame] > 0.5
+            on[:, k] = table[CONTACT + contact.frame] == 1.0
     patterns, index = np.unique(on, axis=0, return_inverse=True)
     sets = tuple(
         tuple(contact for contact, held in zip(contacts, pattern, strict=True) if held)

@@ -2,6 +2,8 @@
 
 import hashlib
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +21,23 @@ from sealag.delay import (
     Table,
     measured,
 )
-from sealag.design._schema import Project
+from sealag.design._plain_words import first_problem
+from sealag.design._schema import Project, SamplesDelay
 from sealag.design._system import System, Tank
 from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
+from sealag.files import read_whole
 from sealag.passivity import Criterion
-from sealag.robot import Contact, ContactKind, Robot, load_robot, resolve_urdf
+from sealag.robot import (
+    UNIT_TOLERANCE,
+    Contact,
+    ContactKind,
+    Robot,
+    load_robot,
+    require_within_limits,
+    resolve_urdf,
+)
+from sealag.typing import Array
 from sealag.whole_body import (
     Feedback,
     GravityCompensation,
@@ -38,6 +51,7 @@ from sealag.whole_body import (
 )
 
 LARGEST_PROJECT_BYTES = 1_000_000
+LARGEST_SAMPLES_BYTES = 50_000_000
 _AXES = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
 _REQUIRED = ("spring_stiffness", "rotor_inertia", "motor_damping", "inertia_shaping")
 
@@ -78,28 +92,10 @@ def load(path: str | Path) -> System:
         ProjectError: it is not TOML, too large, or a key is missing, unknown or wrong.
     """
     path = resolve_project(path)
-    content = _read(path)
+    content = read_whole(path, what="The project file", largest=LARGEST_PROJECT_BYTES)
     project = parse_project(content, path)
-    try:
-        return _system(project, path, content.decode("utf-8"))
-    except (ProjectError, FileError):
-        raise
-    except SealagError as error:
-        raise ProjectError(f"{path}: {error}") from error
-
-
-def _read(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > LARGEST_PROJECT_BYTES:
-            raise ProjectError(
-                f"{path} has {path.stat().st_size / 1e6:.1f} MB; a project file has at most "
-                f"{LARGEST_PROJECT_BYTES / 1e6:.0f} MB."
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise FileError(
-            f"The project file {path} cannot be read: {error.strerror or error}."
-        ) from error
+    with _named(path, ""):
+        return _system(project, path, content.decode("utf-8-sig"))
 
 
 def parse_project(content: bytes, path: Path) -> Any:
@@ -118,66 +114,53 @@ def parse_project(content: bytes, path: Path) -> Any:
     from pydantic import ValidationError
 
     try:
-        data = tomllib.loads(content.decode("utf-8"))
+        data = tomllib.loads(content.decode("utf-8-sig"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise ProjectError(f"{path} is not TOML: {error}.") from error
     try:
         return Project.model_validate(data)
     except ValidationError as error:
-        raise ProjectError(_first_problem(error.errors(), path)) from error
+        raise ProjectError(first_problem(error.errors(), data, path=path)) from error
 
 
-def _first_problem(problems: list[Any], path: Path) -> str:
-    first = problems[0]
-    place = [str(part) for part in first["loc"]]
-    kinds = {"constant", "sinusoid", "table", "samples", "paper", "flat", "rough", "stairs"}
-    key = ".".join(
-        part for part in place if part not in kinds and part != "list[constrained-float]"
-    )
-    found, more = first.get("input"), len({tuple(p["loc"]) for p in problems}) - 1
-    rest = f" ({more} more problem{'s' * (more > 1)} in the file.)" if more else ""
-    match first["type"]:
-        case "missing":
-            return f"{path}: the key {key} is missing.{rest}"
-        case "extra_forbidden":
-            return f"{path}: the key {key} is not known; check its spelling and section.{rest}"
-    if isinstance(found, str) and found.startswith("FILL"):
-        return f"{path}: {key} is still to be filled in ({found}).{rest}"
-    shown = repr(found) if len(repr(found)) < 60 else f"a {type(found).__name__}"
-    unit = " (a delay in ms: was another unit meant?)" if key.endswith("_ms") else ""
-    need = first["msg"].replace("Input should", "it should").rstrip(".")
-    return f"{path}: {key} is {shown}; {need}{unit}.{rest}"
+@contextmanager
+def _named(path: Path, key: str) -> Iterator[None]:
+    """Let errors name the project file and the key that they come from, unless they do so."""
+    try:
+        yield
+    except SealagError as error:
+        if str(error).startswith(f"{path}: "):
+            raise
+        kind = FileError if isinstance(error, FileError) else ProjectError
+        raise kind(f"{path}: {key}{': ' if key else ''}{error}") from error
 
 
 def _system(project: Any, path: Path, text: str) -> System:
     folder = path.parent
-    robot = load_robot(
-        resolve_urdf(project.robot.urdf, relative_to=folder),
-        floating_base=project.robot.base == "floating",
-        actuated=project.robot.actuated,
-    )
-    contacts = tuple(
-        Contact(frame=robot.check_frame(c.frame), kind=ContactKind(c.kind))
-        for c in project.contacts
-    )
+    with _named(path, "robot"):
+        robot = load_robot(
+            resolve_urdf(project.robot.urdf, relative_to=folder),
+            floating_base=project.robot.base == "floating",
+            actuated=project.robot.actuated,
+        )
     hierarchy = Hierarchy(
         tasks=tuple(_task(section) for section in project.tasks),
         form=StiffnessForm(project.controller.stiffness_form),
         task_inertia=TaskInertia(project.controller.task_inertia),
     )
     hierarchy.gain(robot)
-    posture = robot.configuration(
-        project.posture.joints,
-        base_position=project.posture.base_position,
-        base_quaternion=project.posture.base_quaternion_xyzw,
-    )
+    motion_file = folder / project.motion.file if project.motion else None
+    if motion_file and not motion_file.is_file():
+        raise FileError(f"{path}: motion.file is {project.motion.file!r}; there is no such file.")
+    samples = [keys.file for _, keys in project.delays if isinstance(keys, SamplesDelay)]
+    files = [path, robot.urdf_path, motion_file, *(folder / name for name in samples)]
     return System(
         name=path.stem,
         robot=robot,
         actuators=_actuators(project.actuators, robot, path),
         hierarchy=hierarchy,
-        contacts=contacts,
-        posture=posture,
+        contacts=_contacts(project.contacts, robot, path),
+        posture=_posture(project.posture, robot, path),
         feedback=Feedback(project.controller.feedback),
         gravity=GravityCompensation(project.controller.gravity),
         task_error=TaskError(project.controller.task_error),
@@ -188,12 +171,50 @@ def _system(project: Any, path: Path, text: str) -> System:
         ),
         criterion=Criterion(project.controller.criterion),
         delays=_delays(project.delays, folder, path),
-        motion_file=folder / project.motion.file if project.motion else None,
+        motion_file=motion_file,
         sha256=hashlib.sha256(text.encode()).hexdigest(),
         simulation=project.simulation,
         walking=walking_of(project.walking, robot),
         text=text,
+        files=tuple(file for file in files if file is not None),
     )
+
+
+def _contacts(sections: Any, robot: Robot, path: Path) -> tuple[Contact, ...]:
+    if sections and not robot.floating_base:
+        raise ProjectError(
+            f'{path}: robot.base is "fixed", but [[contacts]] hold frames to the ground as well; '
+            'remove them, or let the base be "floating".'
+        )
+    frames = [robot.check_frame(section.frame) for section in sections]
+    for frame in frames:
+        if frames.count(frame) > 1:
+            raise ProjectError(f"{path}: [[contacts]] list the frame {frame} twice; once is right.")
+    return tuple(Contact(frame=c.frame, kind=ContactKind(c.kind)) for c in sections)
+
+
+def _posture(section: Any, robot: Robot, path: Path) -> Array:
+    """The configuration of [posture], which must be one and lie inside the joints' limits."""
+    given = section.model_fields_set & {"base_position", "base_quaternion_xyzw"}
+    if given and not robot.floating_base:
+        raise ProjectError(
+            f'{path}: posture.{min(given)} is given, but robot.base is "fixed", so that the base '
+            'stays where the URDF has it; remove the key, or let the base be "floating".'
+        )
+    length = float(np.linalg.norm(section.base_quaternion_xyzw))
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        raise ProjectError(
+            f"{path}: posture.base_quaternion_xyzw has length {length:.4g}; 1 is right, in the "
+            "order x, y, z, w."
+        )
+    with _named(path, "posture.joints"):
+        q = robot.configuration(
+            section.joints,
+            base_position=section.base_position,
+            base_quaternion=section.base_quaternion_xyzw,
+        )
+        require_within_limits(robot, q)
+    return q
 
 
 def _task(section: Any) -> Task:
@@ -248,21 +269,22 @@ def _delays(section: Any, folder: Path, path: Path) -> Delays:
 
 def _connection(section: Any, name: str, folder: Path, path: Path) -> RoundTrip:
     """A connection from its round trip, or from both of its ways."""
-    whole, up, down = (getattr(section, f"{name}_{way}") for way in ("round_trip", "up", "down"))
-    if whole is not None and up is None and down is None:
-        return RoundTrip.halved(_signal(whole, folder), **_packets(whole))
-    if whole is None and up is not None and down is not None:
-        return RoundTrip(
-            **{
-                way: Link(delay=_signal(keys, folder), **_packets(keys))
-                for way, keys in (("up", up), ("down", down))
-            }
+    sections = {way: getattr(section, f"{name}_{way}") for way in ("round_trip", "up", "down")}
+    given = {way for way, keys in sections.items() if keys is not None}
+    if given not in ({"round_trip"}, {"up", "down"}):
+        said = "given besides one of its ways" if "round_trip" in given else "missing"
+        raise ProjectError(
+            f"{path}: the key delays.{name}_round_trip is {said}; give it alone, or both {name}_up "
+            f"and {name}_down."
         )
-    said = "missing" if whole is None else "given besides one of its ways"
-    raise ProjectError(
-        f"{path}: the key delays.{name}_round_trip is {said}; give it alone, or both {name}_up and "
-        f"{name}_down."
-    )
+    links = {}
+    for way in given:
+        with _named(path, f"delays.{name}_{way}"):
+            links[way] = Link(delay=_signal(sections[way], folder), **_packets(sections[way]))
+    if "round_trip" not in links:
+        return RoundTrip(**links)
+    whole = sections["round_trip"]
+    return RoundTrip.halved(links["round_trip"].delay, **_packets(whole))
 
 
 def _packets(keys: Any) -> dict[str, Any]:
@@ -292,11 +314,17 @@ def _signal(section: Any, folder: Path) -> DelaySignal:
 
 
 def _samples(section: Any, folder: Path) -> DelaySignal:
+    """Measured delays: one number (ms) a line."""
     path = folder / section.file
-    try:
-        values = np.loadtxt(path, ndmin=1)
-    except OSError as error:
-        raise FileError(f"The delay samples {path} cannot be read: {error}.") from error
-    except ValueError as error:
-        raise ProjectError(f"{path} is not one number (ms) a line: {error}.") from error
-    return measured(values * 1e-3, period=section.period_s, quantile=section.quantile)
+    content = read_whole(path, what="The delay samples", largest=LARGEST_SAMPLES_BYTES)
+    values = []
+    for row, line in enumerate(content.decode("utf-8-sig", "replace").splitlines(), start=1):
+        try:
+            values += [float(line)] if line.strip() else []
+        except ValueError as error:
+            raise ProjectError(
+                f"{path}: line {row} is {line.strip()[:60]!r}; one number, a delay in ms, is right."
+            ) from error
+    if not values:
+        raise ProjectError(f"{path} is empty; one delay in ms a line is needed.")
+    return measured(np.array(values) * 1e-3, period=section.period_s, quantile=section.quantile)

@@ -1,18 +1,61 @@
-"""What a project file may say: one class a section, every key with its unit in its name or here."""
+"""What a project file may say: one class a section, every key with its unit in its name or here.
 
-from typing import Annotated, Literal
+Ranges are generous, but physical: what lies outside is a slip of the pen or a mistaken unit, and
+would overflow or leave the numerics without an answer.
+"""
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from typing import Annotated, Any, Literal
 
-Positive = Annotated[FiniteFloat, Field(gt=0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
-Milliseconds = Annotated[FiniteFloat, Field(ge=0, le=5000)]
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    Tag,
+)
+from pydantic_core import PydanticCustomError
+
+
+def _within(low: float, high: float, unit: str = "", *, or_zero: bool = False) -> AfterValidator:
+    """Refuse numbers outside a range with the range and its unit."""
+    need = f"it must {'be 0 or ' if or_zero else ''}lie in {low:g} … {high:g} {unit}".rstrip()
+
+    def check(value: float) -> float:
+        if low <= value <= high or (or_zero and value == 0.0):
+            return value
+        raise PydanticCustomError("range", "{need}", {"need": need})
+
+    return AfterValidator(check)
+
+
+Milliseconds = Annotated[FiniteFloat, _within(0, 5000, "ms")]
+Length = Annotated[FiniteFloat, _within(1e-6, 1e3, "m")]
+LengthOrZero = Annotated[FiniteFloat, _within(0, 1e3, "m")]
+Coordinate = Annotated[FiniteFloat, _within(-1e4, 1e4, "m")]
+Friction = Annotated[FiniteFloat, _within(1e-6, 1e3)]
+Inertia = Annotated[FiniteFloat, _within(1e-9, 1e4, "kg m²")]
+SpringStiffness = Annotated[FiniteFloat, _within(1e-3, 1e8, "Nm/rad")]
+Ratio = Annotated[FiniteFloat, _within(1e-4, 1e4)]
+MotorDamping = Annotated[FiniteFloat, _within(1e-6, 1e6, "Nms/rad")]
+Damping = Annotated[FiniteFloat, _within(0, 1e6, "Nms/rad")]
+TorqueOrZero = Annotated[FiniteFloat, _within(0, 1e6, "Nm")]
+Torque = Annotated[FiniteFloat, _within(1e-6, 1e7, "Nm")]
+Rate = Annotated[FiniteFloat, _within(1e-6, 1e7, "rad/s")]
+Gain = Annotated[FiniteFloat, _within(1e-6, 1e9, "1/s²", or_zero=True)]
+Duration = Annotated[FiniteFloat, _within(1e-6, 1e6, "s")]
+Seed = Annotated[int, Field(ge=0)]
+
+
+def _by_shape(value: Any) -> str:
+    return "list" if isinstance(value, list) else "number"
 
 
 class Section(BaseModel):
-    """A table of the project file; unknown keys are refused."""
+    """A table of the project file; unknown keys are refused, and so is text for a number."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class RobotSection(Section):
@@ -26,7 +69,7 @@ class RobotSection(Section):
 class PostureSection(Section):
     """[posture]: the configuration that is certified without a motion, rad and m."""
 
-    base_position: Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
+    base_position: Annotated[list[Coordinate], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
     base_quaternion_xyzw: Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)] = [
         0.0,
         0.0,
@@ -39,16 +82,16 @@ class PostureSection(Section):
 class ActuatorKeys(Section):
     """Keys of [actuators.default] and [actuators.joint.<name>], SI units."""
 
-    spring_stiffness: Positive | None = None
-    rotor_inertia: Positive | None = None
-    inertia_shaping: Positive | None = None
-    motor_damping: Positive | None = None
-    spring_damping: NotNegative | None = None
-    coulomb_friction: NotNegative | None = None
-    viscous_friction: NotNegative | None = None
-    torque_limit: Positive | None = None
-    velocity_limit: Positive | None = None
-    torque_bandwidth: Positive | None = None
+    spring_stiffness: SpringStiffness | None = None
+    rotor_inertia: Inertia | None = None
+    inertia_shaping: Ratio | None = None
+    motor_damping: MotorDamping | None = None
+    spring_damping: Damping | None = None
+    coulomb_friction: TorqueOrZero | None = None
+    viscous_friction: Damping | None = None
+    torque_limit: Torque | None = None
+    velocity_limit: Rate | None = None
+    torque_bandwidth: Rate | None = None
 
 
 class ActuatorsSection(Section):
@@ -75,8 +118,8 @@ class ControllerSection(Section):
     task_error: Literal["consistent", "plain"] = "consistent"
     criterion: Literal["certified", "published"] = "certified"
     tank_flow: Literal["corrected", "published"] = "corrected"
-    tank_energy_j: NotNegative = 1.0
-    tank_rate: NotNegative = 5.0
+    tank_energy_j: Annotated[FiniteFloat, _within(0, 1e9, "J")] = 1.0
+    tank_rate: Annotated[FiniteFloat, _within(0, 1e6, "1/s")] = 5.0
 
 
 class TaskSection(Section):
@@ -84,7 +127,10 @@ class TaskSection(Section):
 
     name: str
     kind: Literal["com", "position", "orientation", "pose", "posture"]
-    stiffness: NotNegative | list[NotNegative]
+    stiffness: Annotated[
+        Annotated[Gain, Tag("number")] | Annotated[list[Gain], Tag("list")],
+        Discriminator(_by_shape),
+    ]
     frame: str | None = None
     joints: list[str] = []
     axes: list[Literal["x", "y", "z", "rx", "ry", "rz"]] = []
@@ -113,8 +159,8 @@ class SinusoidDelay(DelayTable):
     kind: Literal["sinusoid"]
     mean_ms: Milliseconds
     amplitude_ms: Milliseconds
-    angular_frequency_rad_s: FiniteFloat = 1.0
-    phase_rad: FiniteFloat = 0.0
+    angular_frequency_rad_s: Annotated[FiniteFloat, _within(-1e6, 1e6, "rad/s")] = 1.0
+    phase_rad: Annotated[FiniteFloat, _within(-1e3, 1e3, "rad")] = 0.0
 
 
 class TableDelay(DelayTable):
@@ -130,7 +176,7 @@ class SamplesDelay(DelayTable):
 
     kind: Literal["samples"]
     file: str
-    period_s: Positive
+    period_s: Duration
     quantile: Annotated[FiniteFloat, Field(gt=0, le=1)] = 1.0
 
 
@@ -163,9 +209,11 @@ class PushSection(Section):
     """[[simulation.pushes]]: a constant force on a frame, world axes"""
 
     frame: str
-    force_n: Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
-    start_s: NotNegative
-    duration_s: Positive
+    force_n: Annotated[
+        list[Annotated[FiniteFloat, _within(-1e6, 1e6, "N")]], Field(min_length=3, max_length=3)
+    ]
+    start_s: Annotated[FiniteFloat, _within(0, 1e6, "s")]
+    duration_s: Duration
 
 
 class PaperTerrain(Section):
@@ -184,16 +232,16 @@ class RoughTerrain(Section):
     """kind = "rough": random heights in ± amplitude"""
 
     kind: Literal["rough"]
-    seed: Annotated[int, Field(ge=0)] = 0
-    amplitude_m: Positive = 0.05
+    seed: Seed = 0
+    amplitude_m: Length = 0.05
 
 
 class StairsTerrain(Section):
     """kind = "stairs": level treads"""
 
     kind: Literal["stairs"]
-    rises_m: Annotated[list[FiniteFloat], Field(min_length=1)]
-    run_m: Positive = 0.45
+    rises_m: Annotated[list[Coordinate], Field(min_length=1)]
+    run_m: Length = 0.45
 
 
 TerrainKeys = Annotated[
@@ -207,28 +255,28 @@ class WalkingSection(Section):
 
     feet: Annotated[list[str], Field(min_length=2, max_length=2)]
     steps: Annotated[int, Field(ge=1, le=1000)] = 7
-    friction: Positive = 0.8
+    friction: Friction = 0.8
     terrain: TerrainKeys = PaperTerrain(kind="paper")
     gait: dict[str, FiniteFloat] = {}
-    options: dict[str, bool | FiniteFloat | str] = {}
+    options: dict[str, FiniteFloat | bool | str] = {}
 
 
 class SimulationSection(Section):
     """[simulation]: how `sealag simulate` runs the design"""
 
     scenario: Literal["regulate", "track", "drop", "balance", "walk"] = "regulate"
-    duration_s: Positive = 2.0
-    physics_step_ms: Annotated[FiniteFloat, Field(gt=0, le=10)] | None = None
-    friction: Positive = 0.8
-    foot_radius: NotNegative = 0.0
-    foot_half_length: Positive = 0.1
-    foot_half_width: Positive = 0.06
-    torsional_damping: NotNegative = 0.0
-    torsional_radius: Positive | None = None
-    drop_height: NotNegative = 0.03
-    track_amplitude: NotNegative = 0.02
-    track_frequency_hz: Positive = 0.5
-    seed: Annotated[int, Field(ge=0)] = 0
+    duration_s: Duration = 2.0
+    physics_step_ms: Annotated[FiniteFloat, _within(1e-3, 10, "ms")] | None = None
+    friction: Friction = 0.8
+    foot_radius: LengthOrZero = 0.0
+    foot_half_length: Length = 0.1
+    foot_half_width: Length = 0.06
+    torsional_damping: Damping = 0.0
+    torsional_radius: Length | None = None
+    drop_height: LengthOrZero = 0.03
+    track_amplitude: LengthOrZero = 0.02
+    track_frequency_hz: Annotated[FiniteFloat, _within(1e-6, 1e3, "Hz")] = 0.5
+    seed: Seed = 0
     pushes: list[PushSection] = []
 
 

@@ -34,6 +34,8 @@ LONGEST_STEP = 1e-3
 """Longest physics step, and central period where the project states none, s."""
 SHORTEST_STEP = 1e-5
 """Shortest physics step that is chosen where the project states none, s."""
+LONGEST_RUN = 1e9
+"""s."""
 STEPS_PER_SWING = 8
 """Least number of physics steps in a period of the fastest spring."""
 
@@ -71,20 +73,25 @@ def simulate(
         The run; a fall or divergence is its named outcome.
 
     Raises:
-        InputError: the scenario is unknown, the duration is no time, a foot begins inside the
-            ground, or the torque limits cannot hold the posture.
+        InputError: the scenario is unknown, duration, seed or delay_scale cannot be, the recording
+            would not fit into memory, a push does not act during the run, a foot begins inside
+            the ground, or the torque limits cannot hold the posture.
     """
     setting = system.simulation
-    kind = scenario or setting.scenario
+    kind = setting.scenario if scenario is None else scenario
     if kind not in SCENARIOS:
         raise InputError(f"The scenario is {kind!r}; it must be {either(SCENARIOS)}.")
-    if not (math.isfinite(delay_scale) and delay_scale >= 0.0):
-        raise InputError(f"delay_scale is {delay_scale}; it must be 0 or a positive number.")
+    if seed is not None and not (isinstance(seed, int) and seed >= 0):
+        raise InputError(f"The seed is {seed!r}; it must be a whole number from 0 up.")
     length = scenario_duration(system, kind) if duration is None else duration
+    if not (isinstance(length, int | float) and 0.0 < length <= LONGEST_RUN):
+        raise InputError(f"The duration is {length!r} s; it must be more than 0, at most 1e9 s.")
+    clock = _clock(system)
+    _check_pushes(system, length, step=clock.physics)
     common = {
         "duration": length,
         "network": Network.from_delays(system.delays.scaled(delay_scale)),
-        "clock": _clock(system),
+        "clock": clock,
         "seed": setting.seed if seed is None else seed,
         "progress": progress,
     }
@@ -148,7 +155,7 @@ def scenario_duration(system: System, scenario: str | None = None) -> float:
     Raises:
         InputError: it is a walk and the project describes none.
     """
-    kind = scenario or system.simulation.scenario
+    kind = system.simulation.scenario if scenario is None else scenario
     return _walking(system).duration if kind == "walk" else system.simulation.duration_s
 
 
@@ -276,6 +283,21 @@ def _pushes(system: System, kind: str) -> list[Push]:
         force = 0.05 * system.robot.mass * 9.81
         pushes = [Push(frame=frame, force=(force, 0.0, 0.0), start=0.2, duration=0.1)]
     return pushes
+
+
+def _check_pushes(system: System, length: float, *, step: float) -> None:
+    """Refuse pushes of the project that would not act."""
+    for push in system.simulation.pushes:
+        if push.start_s >= length:
+            raise InputError(
+                f"The push on {push.frame} begins at {push.start_s:g} s, but the run ends at "
+                f"{length:g} s; push earlier or simulate longer."
+            )
+        if push.duration_s < step:
+            raise InputError(
+                f"The push on {push.frame} lasts {push.duration_s:g} s, less than a physics step "
+                f"of {step:g} s; push longer."
+            )
 
 
 def _clock(system: System) -> Clock:

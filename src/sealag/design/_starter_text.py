@@ -9,7 +9,7 @@ REQUIRED = """\
 [robot]
 urdf = {urdf}
 base = "{base}"          # "floating" or "fixed"
-actuated = [             # joints with an actuator; the others are locked at 0
+actuated = [             # joints with an actuator; the others are locked at 0, mimics too
 {actuated}
 ]
 

@@ -63,6 +63,7 @@ class System:
         simulation: the project's [simulation] section.
         walking: the walk that the project describes; None if it has no [walking] section.
         text: the project file's own text, which recordings carry along.
+        files: everything that it was read from: project, URDF, motion, delay samples.
     """
 
     name: str
@@ -82,6 +83,7 @@ class System:
     simulation: SimulationSection
     walking: Walking | None
     text: str
+    files: tuple[Path, ...]
 
     def still(self) -> Motion:
         """Return the posture as a motion of one instant."""

@@ -9,8 +9,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, NoReturn
 
-from sealag.errors import CertificateError, FileError
-from sealag.files import write_text
+from sealag.errors import CertificateError
+from sealag.files import read_whole, write_text
 
 SCHEMA = "sealag-certificate/3"
 LARGEST_BYTES = 500_000_000
@@ -327,12 +327,9 @@ def parse_certificate(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
             odd.append(text)
         return value
 
+    content = read_whole(path, what="The certificate", largest=LARGEST_BYTES)
     try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise CertificateError(f"{path} is too large to be a certificate.")
-        data = json.loads(path.read_text(encoding="utf-8"), parse_float=number)
-    except OSError as error:
-        raise FileError(f"{path} cannot be read: {error.strerror or error}.") from error
+        data = json.loads(content.decode("utf-8"), parse_float=number)
     except (UnicodeDecodeError, json.JSONDecodeError) as error:
         raise CertificateError(f"{path} is not a certificate: it is not JSON ({error}).") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:

@@ -55,6 +55,13 @@ def scaled_task(
     J, inertia, gain, kind = _checked_task(J_star, Lambda, K_x, form=form)
     m, n = J.shape[-2:]
     root, root_error = inverse_root(D_theta, n)
+    shapes = [array.shape[:-2] for array in (J, inertia, gain, root)]
+    try:
+        np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise InputError(
+            f"The batches {shapes} of J_star, Lambda, K_x and D_theta do not fit together."
+        ) from None
     scaled = J @ np.swapaxes(root, -1, -2)
     size = _norm(scaled)
     if kind is StiffnessForm.SYMMETRIC:
@@ -87,7 +94,7 @@ def scaled_stiffness(F: ArrayLike, D_theta: ArrayLike) -> ScaledTask:
     Raises:
         InputError: a shape does not fit, an entry is not finite, or D_θ is not positive definite.
     """
-    stiffness = np.asarray(F, dtype=float)
+    stiffness = _real(F, "F")
     if stiffness.ndim < 2 or stiffness.shape[-1] != stiffness.shape[-2] or not stiffness.shape[-1]:
         raise InputError(f"F has shape {stiffness.shape}; (…, n, n) is needed.")
     if not np.isfinite(stiffness).all():
@@ -152,7 +159,7 @@ def inverse_root(D_theta: ArrayLike, n: int) -> tuple[Array, Array]:
     Raises:
         InputError: D_θ has another shape, is not finite, or is not symmetric positive definite.
     """
-    D = np.asarray(D_theta, dtype=float)
+    D = _real(D_theta, "D_theta")
     if not np.isfinite(D).all():
         raise InputError("D_theta has entries that are not finite numbers.")
     if D.shape == (n,):
@@ -182,9 +189,9 @@ def _checked_task(
     except ValueError:
         known = ", ".join(StiffnessForm)
         raise InputError(f"form is {form!r}; it must be one of {known}.") from None
-    J = np.asarray(J_star, dtype=float)
-    inertia = np.asarray(Lambda, dtype=float)
-    gain = np.asarray(K_x, dtype=float)
+    J = _real(J_star, "J_star")
+    inertia = _real(Lambda, "Lambda")
+    gain = _real(K_x, "K_x")
     if J.ndim < 2 or 0 in J.shape[-2:]:
         raise InputError(f"J_star has shape {J.shape}; (…, m, n) is needed.")
     m = J.shape[-2]
@@ -200,6 +207,17 @@ def _checked_task(
     if kind is not StiffnessForm.FORCE:
         _check_semidefinite("Lambda", inertia)
     return J, inertia, gain, kind
+
+
+def _real(values: ArrayLike, name: str) -> Array:
+    """The values as doubles; numbers that are not real are refused, not cut."""
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise InputError(f"{name} is no array: its rows have different lengths.") from error
+    if array.dtype.kind not in "fiub":
+        raise InputError(f"{name} has entries of type {array.dtype}; real numbers are needed.")
+    return array.astype(float, copy=False)
 
 
 def _check_semidefinite(name: str, array: Array) -> None:

@@ -1,6 +1,7 @@
 """Robots from URDF: configurations, dynamics, frames and contacts. The only room with Pinocchio."""
 
 from sealag.robot._contact import Contact, ContactKind, Motion
+from sealag.robot._limits import UNIT_TOLERANCE, require_within_limits
 from sealag.robot._load import bundled_robot_path, example_robot_path, resolve_urdf
 from sealag.robot._reference import ReferencePosture, reference_posture
 from sealag.robot._robot import Robot, load_robot
@@ -8,6 +9,7 @@ from sealag.robot._stack import Stack, TermRows, stack_terms
 from sealag.robot._workspace import Workspace
 
 __all__ = [
+    "UNIT_TOLERANCE",
     "Contact",
     "ContactKind",
     "Motion",
@@ -20,6 +22,7 @@ __all__ = [
     "example_robot_path",
     "load_robot",
     "reference_posture",
+    "require_within_limits",
     "resolve_urdf",
     "stack_terms",
 ]

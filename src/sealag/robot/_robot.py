@@ -10,10 +10,10 @@ import pinocchio as pin
 
 from sealag.errors import InputError, RobotError, near
 from sealag.robot._contact import Contact
-from sealag.robot._load import read_model, reduce_model, resolve_urdf
+from sealag.robot._load import check_inertias, read_model, reduce_model, resolve_urdf
 from sealag.robot._tree import Mounts, Tree, frame_mounts, tree_of
 from sealag.robot._workspace import Workspace
-from sealag.typing import Array, ArrayLike
+from sealag.typing import Array, ArrayLike, BoolArray
 
 _UNLIMITED = 1e8
 
@@ -34,6 +34,7 @@ class Robot:
         joints: (n) names of the actuated joints, in the order of all arrays.
         position_lower: (n,) rad or m, -inf where there is none.
         position_upper: (n,) rad or m, inf where there is none.
+        sliding: (n,) whether a joint is prismatic, with positions in m.
         velocity_limit: (n,) rad/s or m/s, inf where there is none.
         effort_limit: (n,) Nm or N, inf where there is none.
         rotor_inertia: (n,) reflected rotor inertia that the URDF states, else 0, kg m².
@@ -48,6 +49,7 @@ class Robot:
     joints: tuple[str, ...]
     position_lower: Array
     position_upper: Array
+    sliding: BoolArray
     velocity_limit: Array
     effort_limit: Array
     rotor_inertia: Array
@@ -348,22 +350,26 @@ def load_robot(
         urdf: a path, `bundled:hume.urdf`, or `example-robot-data:<path below robots>`.
         floating_base: whether the root link moves freely.
         actuated: names of the actuated joints; the other movable joints are locked at their
-            neutral position. None takes all.
+            neutral position. None takes all that do not mimic another one.
 
     Returns:
         The robot; its `joints` are in the model's order, whatever the order of `actuated`.
 
     Raises:
         FileError: the file cannot be read.
-        RobotError: it is not a URDF of a robot with mass and one-degree-of-freedom joints.
+        RobotError: it is not a URDF of a robot with physical inertias and joints of one degree of
+            freedom, an actuated joint mimics another one, or moves almost no inertia.
         UnknownNameError: an actuated joint or a bundled robot does not exist.
     """
     path = resolve_urdf(str(urdf))
-    model, digest = read_model(path, floating_base=floating_base)
-    model = reduce_model(model, path, actuated=actuated)
+    model, mimics, digest = read_model(path, floating_base=floating_base)
+    model = reduce_model(model, path, actuated=actuated, mimics=mimics)
+    check_inertias(model, path)
     names = tuple(name for name in model.names[1:] if name != "root_joint")
     mass = float(sum(inertia.mass for inertia in model.inertias[1:]))
     n = len(names)
+    lower, upper = np.array(model.lowerPositionLimit[-n:]), np.array(model.upperPositionLimit[-n:])
+    free = (np.maximum(np.abs(lower), np.abs(upper)) > _UNLIMITED) | ((lower == 0) & (upper == 0))
     if model.nq != n + (7 if floating_base else 0):
         raise RobotError(f"{path}: a joint's position is not one number; that is not supported.")
     return Robot(
@@ -372,8 +378,9 @@ def load_robot(
         urdf_sha256=digest,
         floating_base=floating_base,
         joints=names,
-        position_lower=_limit(model.lowerPositionLimit[-n:], below=True),
-        position_upper=_limit(model.upperPositionLimit[-n:]),
+        position_lower=np.where(free, -np.inf, lower),
+        position_upper=np.where(free, np.inf, upper),
+        sliding=np.array([model.joints[model.getJointId(j)].shortname()[10] == "P" for j in names]),
         velocity_limit=_limit(model.velocityLimit[-n:]),
         effort_limit=_limit(model.effortLimit[-n:]),
         rotor_inertia=np.array(model.armature[-n:], dtype=float),
@@ -382,11 +389,8 @@ def load_robot(
     )
 
 
-def _limit(values: Array, *, below: bool = False) -> Array:
-    """Limits as the URDF gives them; absent, zero (not given) or huge ones are infinite."""
+def _limit(values: Array) -> Array:
+    """Limits as the URDF gives them; absent or huge ones are infinite."""
     array = np.array(values, dtype=float)
-    if below:
-        array[~(np.abs(array) < _UNLIMITED)] = -np.inf
-    else:
-        array[~(np.abs(array) < _UNLIMITED)] = np.inf
+    array[~(np.abs(array) < _UNLIMITED)] = np.inf
     return array

@@ -4,10 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sealag.errors import InputError
 from sealag.simulation._audit import Audit
 from sealag.simulation._outcome import Outcome
 from sealag.simulation._plant import ContactEvent
 from sealag.typing import Array, IntArray
+
+LARGEST_LOG_BYTES = 4_000_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,10 +68,20 @@ class Log:
     Args:
         rows: How many instants there will be at most.
         widths: Length of each named column.
+
+    Raises:
+        InputError: It would not fit into memory.
     """
 
     def __init__(self, rows: int, widths: dict[str, int]) -> None:
         ends = np.cumsum(list(widths.values()))
+        size = 8 * rows * int(ends[-1])
+        if size > LARGEST_LOG_BYTES:
+            raise InputError(
+                f"The run would record {rows:.4g} instants in {size / 1e9:.4g} GB of memory, more "
+                f"than {LARGEST_LOG_BYTES / 1e9:g} GB; simulate for a shorter time, or with longer "
+                "periods (delays.sample_time_ms, simulation.physics_step_ms)."
+            )
         self._table = np.zeros((rows, int(ends[-1])))
         self._slices = dict(zip(widths, map(slice, [0, *ends[:-1].tolist()], ends.tolist())))
         self.filled = 0

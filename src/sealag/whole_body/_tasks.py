@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from sealag.errors import InputError
+from sealag.errors import InputError, either
 from sealag.robot import Robot, TermRows
 from sealag.typing import Array, ArrayLike
 
@@ -71,6 +71,8 @@ class TaskInertia(StrEnum):
 
 _SIZE = {TaskKind.COM: 3, TaskKind.POSITION: 3, TaskKind.ORIENTATION: 3, TaskKind.POSE: 6}
 _NEEDS_FRAME = {TaskKind.POSITION, TaskKind.ORIENTATION, TaskKind.POSE}
+_ONLY = {"frame": _NEEDS_FRAME, "joints": {TaskKind.POSTURE}, "axes": set(_SIZE)}
+"""Keys that only some kinds of tasks have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,12 +103,20 @@ class Task:
         """Refuse what cannot be a task.
 
         Raises:
-            InputError: the frame is missing, axes do not exist, or the stiffness is not a
-                positive semidefinite matrix of the right size.
+            InputError: the frame is missing, a key is given that tasks of this kind do not have,
+                axes do not exist, or an axis or joint is listed twice.
         """
         object.__setattr__(self, "kind", TaskKind(self.kind))
         if self.kind in _NEEDS_FRAME and not self.frame:
-            raise InputError(f"Task {self.name}: a {self.kind} task needs a frame.")
+            raise InputError(f"Task {self.name}: its kind, {self.kind}, needs a frame.")
+        for key, kinds in _ONLY.items():
+            if getattr(self, key) and self.kind not in kinds:
+                raise InputError(
+                    f"Task {self.name}: its kind, {self.kind}, has no {key}; remove the key, or "
+                    f"should it be {either(sorted(kinds))}?"
+                )
+        if len(set(self.axes)) < len(self.axes) or len(set(self.joints)) < len(self.joints):
+            raise InputError(f"Task {self.name}: an axis or joint is listed twice; once is right.")
         size = _SIZE.get(self.kind)
         if size and any(not 0 <= axis < size for axis in self.axes):
             raise InputError(f"Task {self.name}: axes must lie in 0 … {size - 1}.")
