@@ -81,7 +81,7 @@ def test_truncated_file_gives_what_it_holds(tmp_path):
 
 
 def test_full_disk_keeps_what_was_recorded(tmp_path, monkeypatch):
-    real = mcap_module._ReservedFile._write_all
+    real = mcap_module.ReservedFile._write_all
 
     def write(self, data):
         if not self.full and self.tell() + len(data) > 300_000:
@@ -89,7 +89,7 @@ def test_full_disk_keeps_what_was_recorded(tmp_path, monkeypatch):
             raise OSError(errno.ENOSPC, "No space left on device")
         real(self, data)
 
-    monkeypatch.setattr(mcap_module._ReservedFile, "_write_all", write)
+    monkeypatch.setattr(mcap_module.ReservedFile, "_write_all", write)
     path = tmp_path / "run.mcap"
     with pytest.raises(FileError, match="disk is full"):
         _write(path, count=20000)
