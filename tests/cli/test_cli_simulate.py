@@ -162,8 +162,8 @@ def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, capsys, monkeypat
         (["--scenario", "dance"], "scenario"),
         (["--duration", "0"], "duration"),
         (["--duration", "nan"], "duration"),
-        (["--delay-scale", "-1"], "delay_scale"),
-        (["--out", ""], "folder"),
+        (["--delay-scale", "-1"], "--delay-scale"),
+        (["--out", ""], "--out"),
     ],
 )
 def test_bad_scenarios_are_named(arguments, word, tmp_path, capsys):

@@ -93,7 +93,7 @@ def test_jitter_and_losses_count():
         Delays(central=lost, embedded=Constant(0.0))
     with pytest.raises(InputError, match="embedded period"):
         Delays(**plain, embedded_period=0.003)
-    with pytest.raises(InputError, match="share"):
+    with pytest.raises(InputError, match="factor"):
         looks.scaled(-1.0)
 
 

@@ -1,6 +1,5 @@
 """Recordings as MCAP, written: joint states, transforms and named signals that Foxglove opens."""
 
-import errno
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -13,11 +12,8 @@ from typing import Any, Self
 import numpy as np
 
 from sealag.errors import FileError, InputError
+from sealag.report._reserved_file import CHUNK_BYTES, ReservedFile
 from sealag.typing import ArrayLike
-
-CHUNK_BYTES = 256 * 1024
-RESERVE_BYTES = 4 * CHUNK_BYTES
-"""Room kept free beside a recording, so that its last chunk and index fit on a full disk."""
 
 JOINT_STATES = "/joint_states"
 TRANSFORMS = "/tf"
@@ -65,54 +61,6 @@ _TRANSFORMS_SCHEMA = {
 }
 
 
-class _ReservedFile:
-    """A file that keeps room beside it, where there is any, to be closed properly on a full disk.
-
-    What cannot be written as a whole leaves nothing behind, and is kept as the failure.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
-        self._reserve = path.with_name(path.name + ".reserve")
-        self.full = False
-        self.failure: OSError | None = None
-        try:
-            with open(self._reserve, "wb") as reserve:
-                os.posix_fallocate(reserve.fileno(), 0, RESERVE_BYTES)
-        except OSError:
-            self._reserve.unlink(missing_ok=True)
-
-    def write(self, data: bytes) -> int:
-        start = self._file.tell()
-        try:
-            self._write_all(data)
-        except OSError as error:
-            self._file.seek(start)
-            self._file.truncate()
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or self.full:
-                self.failure = error
-                raise
-            self.full = True
-            self._reserve.unlink(missing_ok=True)
-            self.write(data)
-        return len(data)
-
-    def _write_all(self, data: bytes) -> None:
-        rest = memoryview(data)
-        while rest:
-            rest = rest[self._file.write(rest) :]
-
-    def tell(self) -> int:
-        return self._file.tell()
-
-    def flush(self) -> None:
-        self._file.flush()
-
-    def close(self) -> None:
-        self._file.close()
-        self._reserve.unlink(missing_ok=True)
-
-
 @dataclass(slots=True)
 class _Channel:
     identifier: int
@@ -151,7 +99,7 @@ class McapRecorder:
 
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = _ReservedFile(self._partial)
+            self._file = ReservedFile(self._partial)
             self._writer = Writer(
                 self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD
             )
