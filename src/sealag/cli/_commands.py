@@ -68,9 +68,8 @@ def certify_project(
     if proofs != "all" and not (proofs.isascii() and proofs.isdigit() and int(proofs) > 0):
         raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
     path = out or Path(f"{resolve_project(project).stem}.certificate.json")
-    check_output(path, resolve_project(project), *([motion] if motion else []))
     system = load(project)
-    check_output(path, *system.files)
+    check_output(path, *system.files, *([motion] if motion else []))
     with _busy("certifying"):
         certificate = certify(
             system,

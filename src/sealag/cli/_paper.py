@@ -62,7 +62,7 @@ def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
     ablations = walk_success(ablation_cases(), rough_terrains(4), jobs=2)
     gait = walk_success(gait_cases(), rough_terrains(4), jobs=2)
     everywhere = ablation_table(rough_terrains(2), jobs=2)
-    gains = walk_success(gain_cases(), rough_terrains(4), jobs=2)
+    gains = walk_success(gain_cases(system.delays), rough_terrains(4), jobs=2)
     delays, beyond = delay_map(motion, jobs=2), walk_beyond(jobs=2)
     certificate = certify(system, motion, time_varying=True)
     simulated = figure_4(system.robot, simulated_motion(walk.run), system=system)

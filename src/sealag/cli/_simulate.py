@@ -33,7 +33,6 @@ def simulate_project(
 ) -> None:
     """Run a scenario with a progress bar, write the recording and show the audit."""
     path = out or Path(f"{resolve_project(project).stem}.mcap")
-    check_output(path, resolve_project(project))
     system = load(project)
     check_output(path, *system.files)
     length = scenario_duration(system, scenario) if duration is None else duration

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from sealag import __version__
-from sealag.design._criteria import Bounds, certified_bounds, published_bounds
+from sealag.design._criteria import Bounds, asymmetry, certified_bounds, published_bounds
 from sealag.design._evidence import (
     Common,
     Local,
@@ -28,7 +28,6 @@ from sealag.whole_body import (
     GravityCompensation,
     TaskError,
     WholeBodyStack,
-    relative_asymmetry,
 )
 
 PROOF_COUNT = 12
@@ -193,13 +192,12 @@ def _answer(
             f"the law that is run loses its stability at {margin * 1e3:.3f} ms, before its bound: "
             "it also answers to passive motions of the base, which no bound covers"
         )
-    crooked = relative_asymmetry(bounds.F) if kind is Criterion.PUBLISHED else stack.asymmetry
     return {
         "status": Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
         "criterion": kind,
         "max_delay_s": max_delay_s,
         "max_delay_upper_s": float(bounds.upper[worst]),
-        "asymmetry": float(np.max(crooked)),
+        "asymmetry": float(np.max(asymmetry(stack, bounds, kind))),
         "contraction": float(stack.contraction.max()),
         "reasons": tuple(reasons),
     }

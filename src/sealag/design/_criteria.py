@@ -13,7 +13,14 @@ from sealag.passivity import (
     max_delay_multitask,
 )
 from sealag.typing import Array
-from sealag.whole_body import Feedback, StiffnessForm, TankFlow, TaskError, WholeBodyStack
+from sealag.whole_body import (
+    Feedback,
+    StiffnessForm,
+    TankFlow,
+    TaskError,
+    WholeBodyStack,
+    relative_asymmetry,
+)
 
 ASYMMETRY_TOLERANCE = 1e-7
 """Relative asymmetry up to which a stiffness counts as symmetric: rounding, and the error of the
@@ -121,16 +128,6 @@ def _semidefinite(F: Array) -> Array:
     return values[:, 0] >= -1e-9 * np.maximum(np.abs(values).max(axis=1), 1e-300)
 
 
-def printed_form(system: System) -> StiffnessForm:
-    """Return the stiffness form of the published criterion.
-
-    Args:
-        system: the design.
-    """
-    force = system.hierarchy.form is StiffnessForm.FORCE
-    return StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED
-
-
 def task_stiffness(stack: WholeBodyStack, system: System, kind: Criterion) -> Array:
     """Return the task stiffness S that a criterion uses, (N, m, m).
 
@@ -141,9 +138,20 @@ def task_stiffness(stack: WholeBodyStack, system: System, kind: Criterion) -> Ar
     """
     if kind is Criterion.CERTIFIED:
         return stack.stiffness
-    if printed_form(system) is StiffnessForm.FORCE:
+    if system.hierarchy.form is StiffnessForm.FORCE:
         return np.broadcast_to(stack.K_x, stack.stiffness.shape)
     return stack.Lambda @ stack.K_x
+
+
+def asymmetry(stack: WholeBodyStack, bounds: Bounds, kind: Criterion) -> Array:
+    """Return the relative asymmetry that a certificate states, (N,).
+
+    Args:
+        stack: the controller's matrices.
+        bounds: of the criterion.
+        kind: published states that of its own stiffness, certified that of what is fed back.
+    """
+    return relative_asymmetry(bounds.F) if kind is Criterion.PUBLISHED else stack.asymmetry
 
 
 def published_bounds(
@@ -157,7 +165,7 @@ def published_bounds(
         solver: where multipliers of several levels come from; Clarabel's own interface if None.
     """
     D = system.actuators.motor_damping
-    form = printed_form(system)
+    form = system.hierarchy.form.printed
     levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
     S = task_stiffness(stack, system, Criterion.PUBLISHED)
     F = np.swapaxes(stack.J_star, -1, -2) @ S @ stack.J_star

@@ -9,7 +9,6 @@ from sealag.design._criteria import (
     ASYMMETRY_TOLERANCE,
     PROOF_SHARE,
     Bounds,
-    printed_form,
     task_stiffness,
 )
 from sealag.design._system import System
@@ -297,7 +296,9 @@ def _proof(
     if kind is Criterion.PUBLISHED:
         levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
         tasks = [(J[instant], Lambda[instant], K_x) for J, Lambda, K_x in levels]
-        found = task_multipliers(tasks, D, delay=d, form=printed_form(system), solver=solver)
+        found = task_multipliers(
+            tasks, D, delay=d, form=system.hierarchy.form.printed, solver=solver
+        )
         W = [(one.W + one.W.T) / 2.0 for one in found]
     else:
         W = [joint_multiplier(F, D, d)]

@@ -9,6 +9,7 @@ import numpy as np
 from sealag.design._certify import design_entries
 from sealag.design._criteria import (
     Bounds,
+    asymmetry,
     certified_bounds,
     published_bounds,
     task_stiffness,
@@ -18,7 +19,7 @@ from sealag.design._system import System
 from sealag.passivity import Check, Criterion, Verification, read_certificate, verify
 from sealag.robot import Motion
 from sealag.typing import Array
-from sealag.whole_body import WholeBodyStack, relative_asymmetry
+from sealag.whole_body import WholeBodyStack
 
 AGREEMENT = 1e-6
 """Relative difference up to which recomputed numbers agree: another machine rounds in another way,
@@ -99,11 +100,10 @@ def _recomputed(data: dict[str, Any], system: System, motion: Motion) -> Iterato
     longer = np.flatnonzero(claimed > bounds.upper * (1.0 + AGREEMENT))
     words = f"at {len(longer)} of {len(claimed)} instants the claim is longer"
     yield Check(name="motion: bounds", ok=not len(longer), detail=words)
-    crooked = relative_asymmetry(bounds.F) if kind is Criterion.PUBLISHED else stack.asymmetry
     for name, value in (
         ("published_max_delay_s", published.delay.min()),
         ("contraction", stack.contraction.max()),
-        ("asymmetry", crooked.max()),
+        ("asymmetry", asymmetry(stack, bounds, kind).max()),
     ):
         yield _number(f"motion: {name}", data[name], float(value))
     for proof in data["proofs"]:

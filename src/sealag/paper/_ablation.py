@@ -8,7 +8,7 @@ import numpy as np
 
 from sealag.design import load
 from sealag.locomotion import Prediction, Terrain, WalkingOptions
-from sealag.paper._walk import WalkCase
+from sealag.paper._walk import WalkCase, at_delay_scale
 from sealag.paper._walk_table import walk_success
 from sealag.typing import IntArray
 
@@ -122,7 +122,7 @@ def ablation_table(
         steps: number of steps.
         jobs: number of processes.
     """
-    way = 0.5 * load(project).delays.embedded.mean
+    delays = load(project).delays
     conditions: dict[str, dict[str, float]] = {
         "K = 200": {"spring_stiffness": 200.0},
         "K = 1000": {"spring_stiffness": 1000.0},
@@ -138,9 +138,8 @@ def ablation_table(
     cases = {}
     for name, case in means.items():
         for condition, change in conditions.items():
-            scale = change.get("delay_scale", 1.0)
-            options = replace(case.options, embedded_delay=way * scale + 1e-3)
-            cases[f"{name}, {condition}"] = replace(case, options=options, **change)
+            varied = replace(case, **change)
+            cases[f"{name}, {condition}"] = at_delay_scale(varied, delays, varied.delay_scale)
     rows = walk_success(cases, terrains, project=project, jobs=jobs)
     shape = (len(means), len(conditions))
     return AblationTable(

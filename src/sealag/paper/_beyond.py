@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sealag.design import System, certified_bounds, load, local_margins
-from sealag.locomotion import FlatTerrain, WalkingOptions, rough_terrain, stairs
-from sealag.paper._walk import WalkCase
+from sealag.locomotion import FlatTerrain, rough_terrain, stairs
+from sealag.paper._walk import WalkCase, at_delay_scale
 from sealag.paper._walk_table import WalkRow, walk_success
 from sealag.robot import Motion
 from sealag.simulation import Push
@@ -119,13 +119,8 @@ def delay_map(
         jobs: number of processes.
     """
     system = load(project)
-    way = 0.5 * system.delays.embedded.mean
     cases = {
-        f"{K:g} {scale:g}": WalkCase(
-            spring_stiffness=K,
-            delay_scale=scale,
-            options=WalkingOptions(embedded_delay=way * scale + 1e-3),
-        )
+        f"{K:g} {scale:g}": at_delay_scale(WalkCase(spring_stiffness=K), system.delays, scale)
         for K in stiffnesses
         for scale in scales
     }

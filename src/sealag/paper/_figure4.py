@@ -16,7 +16,6 @@ from sealag.whole_body import (
     GravityCompensation,
     StiffnessForm,
     WholeBodyStack,
-    evaluate,
 )
 
 LEG = ("abduction", "hip", "knee")
@@ -107,14 +106,13 @@ def figure_4(robot: Robot, motion: Motion, *, system: System) -> Figure4:
     Returns:
         Bounds of the published criterion over α and D_θ[0], and of the certified one.
     """
-    stack = evaluate(
-        robot,
-        replace(system.hierarchy, form=StiffnessForm.PUBLISHED),
-        system.actuators,
-        motion=motion,
+    printed = replace(
+        system,
+        hierarchy=replace(system.hierarchy, form=StiffnessForm.PUBLISHED),
         feedback=Feedback.MOTOR,
         gravity=GravityCompensation.NONE,
     )
+    stack = printed.evaluate(motion)
     leg = _one_leg(robot, motion, stack)
     D = system.actuators.motor_damping
     hip = [robot.joints.index(f"right_{name}") for name in LEG]

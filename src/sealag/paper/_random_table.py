@@ -7,7 +7,6 @@ import numpy as np
 from sealag.errors import SolverError
 from sealag.margin import SeaPlant, delay_margin, random_sea_plant
 from sealag.passivity import max_delay, max_delay_from_stiffness
-from sealag.whole_body import StiffnessForm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,9 +56,7 @@ def compare_plant(seed: int, *, joints: int | None = None) -> PlantComparison:
         InputError: fewer than one joint.
     """
     plant = random_sea_plant(seed, joints=joints)
-    force = plant.form is StiffnessForm.FORCE
-    form = StiffnessForm.FORCE if force else StiffnessForm.PUBLISHED
-    published = max_delay(plant.J, plant.Lambda, plant.K_x, plant.D_theta, form=form)
+    published = max_delay(plant.J, plant.Lambda, plant.K_x, plant.D_theta, form=plant.form.printed)
     certified = None
     if plant.certifiable and plant.stable:
         certified = float(max_delay_from_stiffness(plant.F, plant.D_theta).delay)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sealag.delay import Delays
 from sealag.design import System, Walking, walk_scene
 from sealag.locomotion import (
     Terrain,
@@ -76,6 +77,18 @@ class WalkCase:
     physics: float = 1e-3
     embedded: float = 0.0
     log_period: float = 1e-3
+
+
+def at_delay_scale(case: WalkCase, delays: Delays, scale: float) -> WalkCase:
+    """Return a walk with longer or shorter delays, of which the controller knows the mean.
+
+    Args:
+        case: The walk.
+        delays: The project's.
+        scale: Factor on them.
+    """
+    way = 0.5 * delays.embedded.mean * scale + TICK
+    return replace(case, delay_scale=scale, options=replace(case.options, embedded_delay=way))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from sealag.delay import Delays
 from sealag.design import System, load
-from sealag.locomotion import Terrain, WalkingOptions, rough_terrain
+from sealag.locomotion import Terrain, rough_terrain
 from sealag.paper._claims import Claim, Verdict
-from sealag.paper._walk import Walk, WalkCase, simulate_walk
+from sealag.paper._walk import Walk, WalkCase, at_delay_scale, simulate_walk
 from sealag.paper._walk_errors import SensorNoise
 
 ENOUGH = 0.95
@@ -161,10 +162,11 @@ def robustness_cases(*, steps: int = 20) -> dict[str, WalkCase]:
     }
 
 
-def gain_cases(*, steps: int = 7) -> dict[str, WalkCase]:
+def gain_cases(delays: Delays, *, steps: int = 7) -> dict[str, WalkCase]:
     """Return the default walk over spring stiffness, α and β.
 
     Args:
+        delays: The project's.
         steps: Number of steps.
     """
     case = WalkCase(steps=steps)
@@ -175,7 +177,7 @@ def gain_cases(*, steps: int = 7) -> dict[str, WalkCase]:
         cases[f"α = {alpha:g}"] = replace(case, damping_scale=alpha)
     for beta in (0.1, 0.5, 1.0, 2.0):
         cases[f"β = {beta:g}"] = replace(case, inertia_shaping=beta)
-    cases["no delay"] = replace(case, delay_scale=0.0, options=WalkingOptions(embedded_delay=1e-3))
+    cases["no delay"] = at_delay_scale(case, delays, 0.0)
     return cases
 
 

@@ -125,13 +125,11 @@ def touching_posture(robot: Robot, q: Array, feet: Sequence[Foot], *, ground: Gr
     q[2] -= gap.min()
     gap = _points(robot, q, feet, ground)[2]
     if gap.max() > _FAR:
-        per_foot = np.split(gap, np.cumsum([len(foot.offsets()) for foot in feet])[:-1])
-        names = [foot.contact.frame for foot in feet]
-        lowest, highest = (names[int(np.argmin([f.min() for f in per_foot]))],
-                           names[int(np.argmax([f.max() for f in per_foot]))])  # fmt: skip
+        names = [foot.contact.frame for foot in feet for _ in foot.offsets()]
         raise InputError(
-            f"foot {highest} is {gap.max() * 1e3:.3g} mm above the ground when {lowest} touches "
-            "it: correct the posture's joints, or leave out the contact that is in the air"
+            f"foot {names[gap.argmax()]} is {gap.max() * 1e3:.3g} mm above the ground when "
+            f"{names[gap.argmin()]} touches it: correct the posture's joints, or leave out the "
+            "contact that is in the air"
         )
     for _ in range(_ROUNDS):
         J, _, gap = _points(robot, q, feet, ground)

@@ -209,11 +209,11 @@ class Controller:
 
     def _work_of_gravity(self, measurement: Measurement, joints: Array) -> float:
         """U_g of the measured configuration and ∫ ḡᵀ dq_j from there to the fed-back one."""
-        away, unused = joints - measurement.q_joint, np.zeros(self._robot.n)
+        away = joints - measurement.q_joint
         self._solve(measurement.q)
         work = float(self._terms[10][1])
         for place, weight in _GAUSS:
-            self._law(measurement, measurement.q_joint + place * away, unused)
+            self._law(measurement, measurement.q_joint + place * away, self._unused)
             work += weight * float(self._space.gravity @ away)
         return work
 

@@ -178,9 +178,22 @@ class _Spaces(NamedTuple):
 def _operational_spaces(
     robot: Robot, hierarchy: Hierarchy, q: Array, *, contacts: Sequence[Contact]
 ) -> _Spaces:
+    stack = stack_terms(robot, q, contacts, rows=hierarchy.rows(robot))
+    return _solved(
+        robot,
+        stack,
+        gain=hierarchy.gain(robot),
+        levels=hierarchy.levels(robot),
+        form=FORM_CODE[hierarchy.form],
+        star=hierarchy.task_inertia is TaskInertia.LAMBDA_STAR,
+    )
+
+
+def _solved(
+    robot: Robot, stack: Stack, *, gain: Array, levels: list[int], form: int, star: bool
+) -> _Spaces:
     from sealag.kernels.operational_space import allocate, operational_spaces
 
-    stack = stack_terms(robot, q, contacts, rows=hierarchy.rows(robot))
     count, c, nv = stack.J_s.shape
     m, n = stack.J_t.shape[1], robot.n
     shapes = ((m, n), (m, m), (m, m), (nv, n), (n,), (m, nv))
@@ -190,10 +203,10 @@ def _operational_spaces(
         stack.g,
         stack.J_s,
         stack.J_t,
-        hierarchy.gain(robot),
-        np.array(hierarchy.levels(robot)),
-        FORM_CODE[hierarchy.form],
-        hierarchy.task_inertia is TaskInertia.LAMBDA_STAR,
+        gain,
+        np.array(levels),
+        form,
+        star,
         RANK_TOLERANCE,
         allocate(nv, n, c, m=m),
         out,
@@ -276,29 +289,6 @@ def _gravity_gradient(
             ahead[j, 0, k] = robot.integrate(q[k], step)
             ahead[j, 1, k] = robot.integrate(q[k], -step)
     stack = stack_terms(robot, ahead.reshape(-1, robot.nq), contacts, rows=())
-    torques = _gravity_torques(robot, stack).reshape(p, 2, count, n)
+    space = _solved(robot, stack, gain=np.zeros((0, 0)), levels=[0], form=0, star=False)
+    torques = space.gravity.reshape(p, 2, count, n)
     return ((torques[:, 0] - torques[:, 1]) / (2.0 * _STEP)).transpose(1, 2, 0)
-
-
-def _gravity_torques(robot: Robot, stack: Stack) -> Array:
-    """ḡ = overline(UN_s)ᵀ g at stacked configurations."""
-    from sealag.kernels.operational_space import allocate, operational_spaces
-
-    count, c, nv = stack.J_s.shape
-    n = robot.n
-    shapes = ((0, n), (0, 0), (0, 0), (nv, n), (n,), (0, nv))
-    out = tuple(np.zeros((count, *shape)) for shape in shapes)
-    operational_spaces(
-        stack.M,
-        stack.g,
-        stack.J_s,
-        np.zeros((count, 0, nv)),
-        np.zeros((0, 0)),
-        np.array([0]),
-        0,
-        False,
-        RANK_TOLERANCE,
-        allocate(nv, n, c, m=0),
-        out,
-    )
-    return out[4]

@@ -33,6 +33,11 @@ class StiffnessForm(StrEnum):
     PUBLISHED = "published"
     FORCE = "force"
 
+    @property
+    def printed(self) -> "StiffnessForm":
+        """The form that the criterion as printed takes for this one: Λ K_x, or K_x without Λ."""
+        return self if self is StiffnessForm.FORCE else StiffnessForm.PUBLISHED
+
 
 class Feedback(StrEnum):
     """The signal that the controller feeds back.
