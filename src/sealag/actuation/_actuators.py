@@ -137,3 +137,24 @@ def joint_values(
         need = "positive" if positive else "0 or positive"
         raise InputError(f"{name} of joint {joints[at]} is {array[at]:g}; it must be {need}.")
     return np.array(array)
+
+
+def motor_parameters(actuators: Actuators) -> Array:
+    """Return the actuators as the motor kernels take them, (n, 10).
+
+    Args:
+        actuators: springs, motors and drives.
+    """
+    columns = [
+        actuators.spring_stiffness,
+        actuators.spring_damping,
+        actuators.rotor_inertia,
+        actuators.rotor_inertia / actuators.shaped_inertia,
+        actuators.motor_damping,
+        actuators.viscous_friction,
+        actuators.coulomb_friction,
+        actuators.torque_limit,
+        actuators.velocity_limit,
+        actuators.torque_bandwidth,
+    ]
+    return np.ascontiguousarray(np.stack(columns, axis=1), dtype=float)

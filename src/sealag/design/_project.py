@@ -23,7 +23,7 @@ from sealag.delay import (
 )
 from sealag.design._plain_words import first_problem
 from sealag.design._schema import Project, SamplesDelay
-from sealag.design._system import System, Tank
+from sealag.design._system import Source, System
 from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
 from sealag.files import read_whole
@@ -38,17 +38,7 @@ from sealag.robot import (
     resolve_urdf,
 )
 from sealag.typing import Array
-from sealag.whole_body import (
-    Feedback,
-    GravityCompensation,
-    Hierarchy,
-    StiffnessForm,
-    TankFlow,
-    Task,
-    TaskError,
-    TaskInertia,
-    TaskKind,
-)
+from sealag.whole_body import Law, Signal, Tank, TankFlow, Task, TaskKind, signal_named
 
 LARGEST_PROJECT_BYTES = 1_000_000
 LARGEST_SAMPLES_BYTES = 50_000_000
@@ -143,12 +133,15 @@ def _system(project: Any, path: Path, text: str) -> System:
             floating_base=project.robot.base == "floating",
             actuated=project.robot.actuated,
         )
-    hierarchy = Hierarchy(
+    law = Law(
         tasks=tuple(_task(section) for section in project.tasks),
-        form=StiffnessForm(project.controller.stiffness_form),
-        task_inertia=TaskInertia(project.controller.task_inertia),
+        signal=_fed_back(project.controller),
+        gravity=project.controller.gravity,
+        stiffness_form=project.controller.stiffness_form,
+        task_inertia=project.controller.task_inertia,
+        task_error=project.controller.task_error,
     )
-    hierarchy.gain(robot)
+    law.gain(robot)
     motion_file = folder / project.motion.file if project.motion else None
     if motion_file and not motion_file.is_file():
         raise FileError(f"{path}: motion.file is {project.motion.file!r}; there is no such file.")
@@ -158,26 +151,32 @@ def _system(project: Any, path: Path, text: str) -> System:
         name=path.stem,
         robot=robot,
         actuators=_actuators(project.actuators, robot, path),
-        hierarchy=hierarchy,
+        law=law,
         contacts=_contacts(project.contacts, robot, path),
         posture=_posture(project.posture, robot, path),
-        feedback=Feedback(project.controller.feedback),
-        gravity=GravityCompensation(project.controller.gravity),
-        task_error=TaskError(project.controller.task_error),
-        tank=Tank(
-            flow=TankFlow(project.controller.tank_flow),
-            energy=project.controller.tank_energy_j,
-            rate=project.controller.tank_rate,
-        ),
         criterion=Criterion(project.controller.criterion),
         delays=_delays(project.delays, folder, path),
-        motion_file=motion_file,
-        sha256=hashlib.sha256(text.encode()).hexdigest(),
         simulation=project.simulation,
         walking=walking_of(project.walking, robot),
-        text=text,
-        files=tuple(file for file in files if file is not None),
+        source=Source(
+            text=text,
+            sha256=hashlib.sha256(text.encode()).hexdigest(),
+            files=tuple(file for file in files if file is not None),
+            motion_file=motion_file,
+        ),
     )
+
+
+def _fed_back(section: Any) -> Signal:
+    """The signal of [controller], with the tank's settings where it is the tank."""
+    signal = signal_named(section.feedback)
+    if isinstance(signal, Tank):
+        return Tank(
+            energy=section.tank_energy_j,
+            rate=section.tank_rate,
+            flow=TankFlow(section.tank_flow),
+        )
+    return signal
 
 
 def _contacts(sections: Any, robot: Robot, path: Path) -> tuple[Contact, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sealag.actuation import Actuators
+from sealag.actuation import Actuators, motor_parameters
 from sealag.errors import InputError
 from sealag.robot import Robot
 from sealag.simulation._contacts import MARGIN, Contacts
@@ -96,7 +96,7 @@ class Plant:
         n, nv, self._sizes = robot.n, robot.nv, self.contacts.sizes
         self.time = 0.0
         self._terms = dynamics.allocate(robot.tree[0])
-        self._parameters = actuator_parameters(actuators)
+        self._parameters = motor_parameters(actuators)
         self._instant = 0.0 if delayed_torque_feedback else 1.0
         self._tables = (
             np.empty((n, 4, 9, 9)),
@@ -373,20 +373,3 @@ class Plant:
                     impulse=(x, y, z),
                 )
             )
-
-
-def actuator_parameters(actuators: Actuators) -> Array:
-    """Return the motor kernels' parameters (n, 10) of a set of actuators."""
-    columns = [
-        actuators.spring_stiffness,
-        actuators.spring_damping,
-        actuators.rotor_inertia,
-        actuators.rotor_inertia / actuators.shaped_inertia,
-        actuators.motor_damping,
-        actuators.viscous_friction,
-        actuators.coulomb_friction,
-        actuators.torque_limit,
-        actuators.velocity_limit,
-        actuators.torque_bandwidth,
-    ]
-    return np.ascontiguousarray(np.stack(columns, axis=1), dtype=float)

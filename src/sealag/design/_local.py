@@ -1,0 +1,259 @@
+"""Stability and delay margin of the law that runs, decided over all instants of a motion."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from sealag.design._criteria import ASYMMETRY_TOLERANCE, Bounds
+from sealag.design._system import System
+from sealag.errors import ContractionError, SolverError
+from sealag.margin import DelayMargin, delay_margin
+from sealag.robot import Motion
+from sealag.typing import Array
+from sealag.whole_body import FrozenLoop, LinkPlant, Rest, Spaces
+
+MOST_EXACT = 600
+"""Instants of a motion that are decided exactly at most; a bound decides the others, or none."""
+
+_FEW = 50  # instants up to which all are decided, also once one is known to be unstable
+_AT_REST = 1e-9  # share of weight and torques that springs and contacts may leave over at a posture
+_MINIMUM = 1e-9  # share of the largest curvature above which a potential has a strict minimum
+
+
+class Basis(StrEnum):
+    """How the margin of an instant is known."""
+
+    EXACT = "exact"
+    """It is the margin itself."""
+    BOUND = "bound"
+    """The loop is stable without delay, and its passive bound lies below its margin."""
+    OPEN = "open"
+    """It was not decided."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InstantMargin:
+    """What is known of one instant.
+
+    Attributes:
+        basis: how it is known.
+        delay: margin or its lower bound, s; NaN if open.
+        unstable_roots: roots not in the open left half-plane without delay; 0 if open.
+    """
+
+    basis: Basis
+    delay: float
+    unstable_roots: int = 0
+
+
+OPEN = InstantMargin(basis=Basis.OPEN, delay=float("nan"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Local:
+    """Stability over a motion.
+
+    Attributes:
+        instants: what is known of each instant.
+        critical: the instant with the smallest margin; of those unstable without delay the one with
+            most unstable roots.
+        margin: its exact margin; None if none could be decided.
+        loop: its frozen loop; None where the law has none.
+        rest: where it rests; None if it was not looked for.
+        problem: why the critical instant has no margin, in words; empty if it has.
+    """
+
+    instants: tuple[InstantMargin, ...]
+    critical: int
+    margin: DelayMargin | None
+    loop: FrozenLoop | None
+    rest: Rest | None
+    problem: str
+
+    @property
+    def unstable_modes(self) -> int:
+        """Most unstable roots without delay over the instants that were decided."""
+        return max(one.unstable_roots for one in self.instants)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the loop is stable without delay at every instant; None if that is not known."""
+        if self.unstable_modes or any(one.delay == 0.0 for one in self.instants):
+            return False
+        return None if any(one.basis is Basis.OPEN for one in self.instants) else True
+
+    @property
+    def margin_s(self) -> float | None:
+        """Smallest margin over the motion, s; None unless every instant was decided, or one is
+        unstable."""
+        exact = [one.delay for one in self.instants if one.basis is Basis.EXACT]
+        least = min(exact, default=np.inf)
+        if least == 0.0:
+            return 0.0
+        open_ = any(one.basis is Basis.OPEN for one in self.instants)
+        below = any(one.basis is Basis.BOUND and one.delay < least for one in self.instants)
+        return None if open_ or below or not exact else least
+
+    @property
+    def first_crossing_s(self) -> float | None:
+        """Delay at which roots cross first at the critical instant, s; None if not known."""
+        if self.margin is None or np.isnan(self.margin.first_crossing):
+            return None
+        return float(self.margin.first_crossing)
+
+    def undercut(self, bounds: Array) -> list[int]:
+        """Return the instants whose exact margin lies below their bound (N,)."""
+        return [
+            k
+            for k, one in enumerate(self.instants)
+            if one.basis is Basis.EXACT and one.delay < bounds[k]
+        ]
+
+    def count(self, basis: Basis) -> int:
+        """Return how many instants were decided in a way."""
+        return sum(one.basis is basis for one in self.instants)
+
+
+def local_of(system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> Local:
+    """Decide stability and margin of the law that runs at every instant of a motion.
+
+    Each instant is a loop that holds the instant's configuration, frozen where it rests. Where the
+    law has a potential, it rests at the instant itself, joints determine all motions and the drives
+    are ideal, a potential with a strict minimum is stable without delay, and the passive bound lies
+    below the margin (V̇ ≤ 0 for delays up to it): such an instant is decided exactly only if its
+    bound lies below the smallest margin known. All others are decided exactly, up to MOST_EXACT.
+
+    Args:
+        system: the design.
+        motion: its instants.
+        spaces: the law's matrices along it.
+        bounds: of the certified criterion.
+    """
+    return _Decision(system, motion, spaces, bounds).run()
+
+
+class _Decision:
+    """What is known so far."""
+
+    def __init__(self, system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> None:
+        self._system, self._motion, self._spaces, self._bounds = system, motion, spaces, bounds
+        self._found: list[InstantMargin] = [OPEN] * len(motion)
+        self._best: tuple[DelayMargin | None, FrozenLoop | None, Rest | None, str, int] | None = None
+        self._exact = 0
+
+    def run(self) -> Local:
+        count = len(self._motion)
+        bounded = self._bounded() if count > 1 else np.zeros(count, dtype=bool)
+        for k in _spread(np.flatnonzero(~bounded), MOST_EXACT):
+            if self._decide(int(k)) and count > _FEW:
+                break
+        for k in np.flatnonzero(bounded):
+            delay = float(self._bounds.delay[k])
+            self._found[k] = InstantMargin(basis=Basis.BOUND, delay=delay)
+        for k in np.argsort(np.where(bounded, self._bounds.delay, np.inf), kind="stable"):
+            if not bounded[k] or self._bounds.delay[k] >= self._least() or self._exact > MOST_EXACT:
+                break
+            self._decide(int(k))
+        assert self._best is not None
+        margin, loop, rest, problem, critical = self._best
+        return Local(
+            instants=tuple(self._found), critical=critical, margin=margin, loop=loop, rest=rest,
+            problem=problem,
+        )  # fmt: skip
+
+    def _least(self) -> float:
+        exact = [one.delay for one in self._found if one.basis is Basis.EXACT]
+        return min(exact, default=np.inf)
+
+    def _decide(self, k: int) -> bool:
+        """Decide an instant exactly; return whether it is unstable without delay."""
+        self._exact += 1
+        rest, loop, margin, problem = self._system.rest(self._motion, k), None, None, ""
+        try:
+            loop = self._system.frozen(self._motion, k, rest=rest)
+            margin = margin_of(loop)
+        except (ContractionError, SolverError) as error:
+            problem = str(error)
+        roots = 0 if margin is None else margin.unstable_roots
+        if not rest.found:
+            problem = rest.reason
+        unstable = bool(roots) or not rest.found or loop is None
+        if margin is not None or unstable:
+            delay = 0.0 if unstable or margin is None else float(margin.delay)
+            self._found[k] = InstantMargin(basis=Basis.EXACT, delay=delay, unstable_roots=roots)
+        self._keep(k, margin, loop, rest, problem)
+        return unstable
+
+    def _keep(
+        self,
+        k: int,
+        margin: DelayMargin | None,
+        loop: FrozenLoop | None,
+        rest: Rest,
+        problem: str,
+    ) -> None:
+        """Keep the instant if its margin is the smallest so far."""
+        if self._best is not None:
+            old, new = self._found[self._best[-1]], self._found[k]
+            if new.basis is Basis.OPEN:
+                return
+            if old.basis is not Basis.OPEN and (old.delay, -old.unstable_roots) <= (
+                new.delay,
+                -new.unstable_roots,
+            ):
+                return
+        self._best = margin, loop, rest, problem, k
+
+    def _bounded(self) -> Array:
+        """Instants (N,) at which a potential decides: stable, with a margin above the bound."""
+        system, spaces = self._system, self._spaces
+        good = (self._bounds.delay > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
+        if not (system.law.rests_at_posture and system.ideal_drives):
+            return np.zeros(len(good), dtype=bool)
+        plants = [LinkPlant(system.robot, contacts) for contacts in self._motion.contact_sets]
+        for k in np.flatnonzero(good):
+            plant = plants[self._motion.contact_index[k]]
+            good[k] = self._at_minimum(plant, int(k))
+        return good
+
+    def _at_minimum(self, plant: LinkPlant, k: int) -> bool:
+        """Whether the loop rests at the instant, in a strict minimum of the whole potential."""
+        system, q, springs = self._system, self._motion.q[k], self._spaces.gravity[k]
+        links = plant.free(q, springs)
+        S, K = links.Z[system.robot.nv_base :], np.diag(system.actuators.spring_stiffness)
+        force = system.robot.gravity(q)
+        force[system.robot.nv_base :] -= springs
+        weight = max(9.81 * system.robot.mass, float(np.abs(springs).max(initial=0.0)))
+        if np.abs(links.Z.T @ force).max(initial=0.0) > _AT_REST * weight:
+            return False
+        if np.linalg.matrix_rank(S) < S.shape[1]:
+            return False
+        F = self._spaces.F_theta[k]
+        hessian = np.block([[links.H + S.T @ K @ S, -S.T @ K], [-K @ S, K + (F + F.T) / 2.0]])
+        values = np.linalg.eigvalsh(hessian)
+        return bool(values[0] > _MINIMUM * values[-1])
+
+
+def margin_of(loop: FrozenLoop, **choices: object) -> DelayMargin:
+    """Return the exact margin of a frozen loop; see `sealag.margin.delay_margin`.
+
+    Args:
+        loop: the loop.
+        choices: what `delay_margin` may be asked besides.
+    """
+    return delay_margin(
+        loop.A_0,
+        loop.A_1,
+        A_e=loop.A_e,
+        embedded_delay=loop.embedded_delay,
+        symmetries=loop.symmetries,
+        **choices,  # pyright: ignore[reportArgumentType]
+    )
+
+
+def _spread(instants: Array, most: int) -> Array:
+    """The instants, or evenly spaced ones if there are more than `most`."""
+    if len(instants) <= most:
+        return instants
+    return instants[np.linspace(0, len(instants) - 1, most).astype(int)]
