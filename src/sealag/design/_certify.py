@@ -21,8 +21,19 @@ from sealag.design._evidence import (
 )
 from sealag.design._system import System
 from sealag.errors import InputError, either
-from sealag.passivity import Certificate, Criterion, Solver, Status, Worst
+from sealag.passivity import (
+    Assumption,
+    Basis,
+    Certificate,
+    Criterion,
+    Critical,
+    Rest,
+    Solver,
+    Status,
+    Worst,
+)
 from sealag.robot import Motion
+from sealag.units import time_text
 from sealag.whole_body import (
     Feedback,
     GravityCompensation,
@@ -90,12 +101,15 @@ def certify(
     )
     if missing:
         bounds, common, moving = without(bounds, missing), None, None
-    local = frozen_loop(system, motion, stack, instant=int(np.argmin(bounds.delay)))
+    locals_ = [frozen_loop(system, motion, stack, instant=k) for k in range(len(motion))]
+    at = min(range(len(locals_)), key=lambda k: _order(locals_[k]))
+    local = locals_[at]
     return Certificate(
         **_answer(
             system, stack, bounds, kind=kind, local=local, open_=_left_open(system, common, moving)
         ),
         **_at_worst(system, motion, bounds, local),
+        **_over_motion(motion, locals_, at),
         **_shared(bounds, common, moving),
         **design_entries(system),
         instants=len(motion),
@@ -152,6 +166,11 @@ def design_entries(system: System) -> dict[str, Any]:
         "joints": system.robot.joints,
         "D_theta": system.actuators.motor_damping.tolist(),
         "spring_stiffness": system.actuators.spring_stiffness.tolist(),
+        "spring_damping": system.actuators.spring_damping.tolist(),
+        "viscous_friction": system.actuators.viscous_friction.tolist(),
+        "motor_inertia": system.actuators.shaped_inertia.tolist(),
+        "rotor_inertia": system.actuators.rotor_inertia.tolist(),
+        "torque_bandwidth": [_finite(value) for value in system.actuators.torque_bandwidth],
         "hashes": {"urdf": system.robot.urdf_sha256, "project": system.sha256},
     }
 
@@ -164,6 +183,33 @@ def _left_open(system: System, common: Common | None, moving: Moving | None) -> 
         for what, found in parts
         if found and found.left_open and found.delay < system.delays.d_1
     )
+
+
+def _order(local: Local) -> tuple[float, int]:
+    """By margin, what is not known last; among zeros the most unstable first."""
+    return (np.inf if local.margin_s is None else local.margin_s), -local.unstable
+
+
+def _over_motion(motion: Motion, locals_: list[Local], at: int) -> dict[str, Any]:
+    """Stability and local margin at every instant."""
+    margins = [local.margin_s for local in locals_]
+    known = [margin for margin in margins if margin is not None]
+    unstable = max(local.unstable for local in locals_)
+    return {
+        "critical": Critical(instant=at, time_s=float(motion.time[at])),
+        "stable": False if unstable else (True if len(known) == len(margins) else None),
+        "local_margin_s": min(known, default=None),
+        "first_crossing_s": locals_[at].first_crossing_s,
+        "unstable_modes": unstable,
+        "instant_margins_s": margins,
+        "instant_basis": [Basis.OPEN if m is None else Basis.EXACT for m in margins],
+        "local_loop": locals_[at].loop,
+        "equilibrium": Rest(found=True, moved_rad=0.0) if len(motion) == 1 else None,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _answer(
@@ -182,14 +228,20 @@ def _answer(
     if not reasons and delay_s > max_delay_s:
         solver = f"; a longer one is open: {bounds.left_open}" if bounds.left_open else ""
         reasons.append(
-            f"the design's delay of {delay_s * 1e3:.3f} ms exceeds the bound of "
-            f"{max_delay_s * 1e3:.3f} ms{solver}"
+            f"the design's delay of {time_text(delay_s)} exceeds the bound of "
+            f"{time_text(max_delay_s)}{solver}"
         )
     reasons += open_
     certified, margin = kind is Criterion.CERTIFIED, local.margin_s
-    if certified and not reasons and local.stable and margin is not None and margin < max_delay_s:
+    if (
+        certified
+        and not reasons
+        and not local.unstable
+        and margin is not None
+        and margin < max_delay_s
+    ):
         reasons.append(
-            f"the law that is run loses its stability at {margin * 1e3:.3f} ms, before its bound: "
+            f"the law that is run loses its stability at {time_text(margin)}, before its bound: "
             "it also answers to passive motions of the base, which no bound covers"
         )
     return {
@@ -197,8 +249,8 @@ def _answer(
         "criterion": kind,
         "max_delay_s": max_delay_s,
         "max_delay_upper_s": float(bounds.upper[worst]),
-        "asymmetry": float(np.max(asymmetry(stack, bounds, kind))),
-        "contraction": float(stack.contraction.max()),
+        "asymmetry": _finite(np.max(asymmetry(stack, bounds, kind))),
+        "contraction": _finite(stack.contraction.max()),
         "reasons": tuple(reasons),
     }
 
@@ -217,11 +269,6 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
             direction=dict(zip(system.robot.joints, (power / power.sum()).tolist(), strict=True)),
         ),
         "worst_motion": [y.real.tolist(), y.imag.tolist()],
-        "stable": local.stable,
-        "local_margin_s": margin,
-        "first_crossing_s": local.first_crossing_s,
-        "unstable_modes": local.unstable,
-        "local_loop": local.loop,
         "conservatism": margin / bound if margin is not None and known else None,
     }
 
@@ -247,41 +294,48 @@ def _shared(bounds: Bounds, common: Common | None, moving: Moving | None) -> dic
 
 def _assumptions(
     system: System, criterion: Criterion, motion: Motion, local: Local
-) -> tuple[str, ...]:
-    said = [
-        "coefficients are frozen at each instant (quasi-static: the multiplier may differ from "
-        "instant to instant; `common_multiplier_delay_s` is the bound with a single one)",
-        "the embedded motor damping D_θ acts without delay",
-        f"d_1 is at most {system.delays.d_1 * 1e3:.3f} ms; it may vary below that; where no "
-        "embedded period is given, packets are sent and taken at once",
-        "the ways up and down count by their sum d_1 alone, since a stiffness is all that is fed "
-        "back; d_2 delays the feedforward and moves no root",
-        "contacts neither slip nor lift off",
-    ]
+) -> tuple[Assumption, ...]:
+    said = {
+        "frozen_coefficients": "coefficients are frozen at each instant (quasi-static: the "
+        "multiplier may differ from instant to instant; `common_multiplier_delay_s` is the bound "
+        "with a single one)",
+        "embedded_damping": "the embedded motor damping D_θ acts without delay",
+        "delay_bound": f"d_1 is at most {time_text(system.delays.d_1)}; it may vary "
+        "below that; where no embedded period is given, packets are sent and taken at once",
+        "one_delay": "the ways up and down count by their sum d_1 alone, since a "
+        "stiffness is all that is fed back; d_2 delays the feedforward and moves no root",
+        "contacts": "contacts neither slip nor lift off",
+    }
     if system.delays.delayed_torque_feedback:
-        said.append("the embedded torque feedback acts without delay, though the design delays it")
+        said["torque_feedback"] = (
+            "the embedded torque feedback acts without delay, though the design delays it"
+        )
     if system.gravity is GravityCompensation.PLANNED:
-        said.append("gravity compensation comes from the plan and has no feedback gradient")
+        said["planned_gravity"] = (
+            "gravity compensation comes from the plan and has no feedback gradient"
+        )
     if system.feedback is Feedback.STATIC_JOINT_TANK:
-        said.append("the energy tank pays for all that u does; u = 0 while it is empty")
+        said["tank"] = "the energy tank pays for all that u does; u = 0 while it is empty"
     if len(system.hierarchy.levels(system.robot)) > 2:
-        said.append(
+        said["lower_tasks"] = (
             "a lower task's error is what the tasks above leave of it"
             if system.task_error is TaskError.CONSISTENT
             else "lower tasks feed back their whole errors, as printed"
         )
     if local.coupled:
-        said.append(
+        said["passive_base"] = (
             "motions of the base that the motors do not determine stand still: what they move of "
             "x is an input, not part of the delayed loop; the local margin includes them"
         )
     if criterion is Criterion.PUBLISHED:
-        said.append(
+        said["published_criterion"] = (
             "the criterion is (29)/(31) as printed: it takes Λ K_x for symmetric, x(θ) for what is "
             "fed back and gravity for not delayed, and can certify what is unstable"
         )
     else:
-        said.append("passive is not stable: `stable` and the local margin are separate answers")
+        said["passive_not_stable"] = (
+            "passive is not stable: `stable` and the local margin are separate answers"
+        )
     if len(motion) > 1:
-        said.append("the motion's instants are checked, not what lies between them")
-    return tuple(said)
+        said["between_instants"] = "the motion's instants are checked, not what lies between them"
+    return tuple(Assumption(key=key, text=text) for key, text in said.items())

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sealag.design._criteria import (
-    ASYMMETRY_TOLERANCE,
     PROOF_SHARE,
     Bounds,
     task_stiffness,
@@ -78,8 +77,6 @@ class Local:
         margin_s: exact delay margin, s; None if it could not be decided.
         first_crossing_s: first delay at which roots cross, s; None likewise.
         unstable: roots with positive real part without delay.
-        stable: whether the potential has a strict minimum; without a potential, because the law
-            answers to passive motions, whether no root is unstable; None where unknown.
         coupling: ‖−∂τ_osc/∂z‖ at fixed θ over ‖F‖, z the motions that contacts leave free.
         loop: the loop; None where the fed-back signal has none.
     """
@@ -87,7 +84,6 @@ class Local:
     margin_s: float | None
     first_crossing_s: float | None
     unstable: int
-    stable: bool | None
     coupling: float
     loop: LocalLoop | None
 
@@ -192,43 +188,41 @@ def frozen_loop(system: System, motion: Motion, stack: WholeBodyStack, *, instan
         instant: which one.
     """
     if not np.isfinite(stack.F_theta[instant]).all():
-        return Local(
-            margin_s=None, first_crossing_s=None, unstable=0, stable=None, coupling=0.0, loop=None
-        )
+        return Local(margin_s=None, first_crossing_s=None, unstable=0, coupling=0.0, loop=None)
     frozen = system.frozen(motion, stack, instant)
     try:
         margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries)
-        margin_s, crossing_s = float(margin.delay), float(margin.first_crossing)
-        unstable, frequency = margin.unstable_roots, margin.frequency
+        margin_s, crossing_s = _known(margin.delay), _known(margin.first_crossing)
+        unstable, frequency = margin.unstable_roots, _known(margin.frequency)
     except SolverError:
         values = np.linalg.eigvals(frozen.A_0 + frozen.A_1)
         unstable = int((values.real > 1e-9 * np.abs(values).max()).sum())
-        margin_s, crossing_s, frequency = 0.0 if unstable else None, None, math.nan
-    symmetric = stack.asymmetry[instant] <= ASYMMETRY_TOLERANCE
-    stable = frozen.stable if symmetric and system.feedback is not Feedback.JOINT else None
+        margin_s, crossing_s, frequency = 0.0 if unstable else None, None, None
     coupling = 0.0 if system.feedback is Feedback.JOINT else frozen.passive_coupling
-    if coupling > COUPLING_TOLERANCE:
-        stable = unstable == 0
     return Local(
         margin_s=margin_s,
         first_crossing_s=crossing_s,
         unstable=unstable,
-        stable=stable,
         coupling=coupling,
         loop=_loop(system, frozen, frequency),
     )
 
 
-def _loop(system: System, frozen: Linearisation, frequency: float) -> LocalLoop:
-    half = len(frozen.A_0) // 2
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else float(value)
+
+
+def _loop(system: System, frozen: Linearisation, frequency: float | None) -> LocalLoop:
+    joints = [f"theta:{name}" for name in system.robot.joints]
+    free = [f"z{k}" for k in range(len(frozen.A_0) // 2 - len(joints))]
     return LocalLoop(
-        P=(-frozen.A_0[half:, :half]).tolist(),
-        R=(-frozen.A_0[half:, half:]).tolist(),
-        L=(-frozen.A_1[half:, :half]).tolist(),
-        symmetries=frozen.symmetries[:half].tolist(),
-        motor_inertia=system.actuators.shaped_inertia.tolist(),
-        spring_damping=system.actuators.spring_damping.tolist(),
-        frequency_rad_s=float(frequency),
+        A_0=frozen.A_0.tolist(),
+        A_1=frozen.A_1.tolist(),
+        A_e=None,
+        embedded_delay_s=0.0,
+        symmetries=frozen.symmetries.tolist() if frozen.symmetries.size else [],
+        states=[*free, *joints, *(f"d/dt {name}" for name in (*free, *joints))],
+        frequency_rad_s=frequency,
     )
 
 
