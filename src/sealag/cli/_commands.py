@@ -7,15 +7,13 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sealag.cli._app import show_json
 from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
 from sealag.errors import FileError, InputError
 from sealag.files import check_output, make_folder, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
-from sealag.units import seconds_from_ms, time_text
+from sealag.units import time_text
 
 LONGEST_HORIZON_MS = 1e6
 LARGEST_LIST = 250

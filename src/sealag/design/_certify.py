@@ -1,29 +1,29 @@
 """From a system and a motion to a certificate."""
 
 import sys
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from sealag import __version__
+from sealag.design._assumptions import assumptions_of
 from sealag.design._criteria import Bounds, asymmetry, certified_bounds, published_bounds
 from sealag.design._evidence import (
     Common,
-    Local,
     Moving,
     common_multiplier,
-    frozen_loop,
     instant_proofs,
     moving_multiplier,
+    stated_loop,
     without,
     worst_motion,
 )
+from sealag.design._local import Local, local_of
 from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.passivity import (
-    Assumption,
-    Basis,
     Certificate,
     Criterion,
     Critical,
@@ -33,13 +33,9 @@ from sealag.passivity import (
     Worst,
 )
 from sealag.robot import Motion
+from sealag.typing import Array
 from sealag.units import time_text
-from sealag.whole_body import (
-    Feedback,
-    GravityCompensation,
-    TaskError,
-    WholeBodyStack,
-)
+from sealag.whole_body import Spaces
 
 PROOF_COUNT = 12
 """Instants whose numbers a certificate holds if nothing else is asked for."""
@@ -55,6 +51,9 @@ def certify(
     solver: Solver | None = None,
 ) -> Certificate:
     """Certify how much delay a design tolerates at every instant of a motion.
+
+    A posture is certified where the loop that holds it rests; the instants of a motion as they are.
+    Stability and local margin are decided over all instants, where the loop that holds each rests.
 
     Args:
         system: the design.
@@ -79,12 +78,15 @@ def certify(
         RobotError: a mass matrix is not positive definite.
         UnknownNameError: a frame or joint does not exist.
     """
-    motion = system.still() if motion is None else motion
     kind = _criterion(system, motion, criterion, time_varying=time_varying, proofs=proofs)
-    stack = system.evaluate(motion)
-    published = published_bounds(stack, system, solver=solver)
+    rest = system.rest() if motion is None else None
+    motion = system.still() if motion is None else motion
+    taken = motion if rest is None else replace(motion, q=rest.fed_back[None])
+    spaces = system.spaces(taken)
+    published = published_bounds(spaces, system, solver=solver)
     printed = kind is Criterion.PUBLISHED
-    bounds = published if printed else certified_bounds(stack, system)
+    passive = certified_bounds(spaces, system, rest)
+    bounds = published if printed else passive
     shared = not printed and len(motion) > 1 and not bounds.reasons
     common = common_multiplier(system, bounds, solver=solver) if shared else None
     moving = None
@@ -92,7 +94,7 @@ def certify(
         moving = moving_multiplier(system, motion, bounds, solver=solver)
     held, missing = instant_proofs(
         system,
-        stack,
+        spaces,
         bounds,
         kind=kind,
         count=proofs,
@@ -101,20 +103,19 @@ def certify(
     )
     if missing:
         bounds, common, moving = without(bounds, missing), None, None
-    locals_ = [frozen_loop(system, motion, stack, instant=k) for k in range(len(motion))]
-    at = min(range(len(locals_)), key=lambda k: _order(locals_[k]))
-    local = locals_[at]
+    local = local_of(system, motion, spaces, passive)
     return Certificate(
         **_answer(
-            system, stack, bounds, kind=kind, local=local, open_=_left_open(system, common, moving)
+            system, spaces, bounds, kind=kind, local=local, open_=_left_open(system, common, moving)
         ),
         **_at_worst(system, motion, bounds, local),
-        **_over_motion(motion, locals_, at),
+        **_over_motion(motion, local),
         **_shared(bounds, common, moving),
         **design_entries(system),
         instants=len(motion),
+        equilibrium=None if rest is None else Rest(found=rest.found, moved_rad=rest.moved),
         published_max_delay_s=float((bounds if printed else published).delay.min()),
-        assumptions=_assumptions(system, kind, motion, local),
+        assumptions=assumptions_of(system, motion, kind, local),
         time_s=motion.time.tolist(),
         bounds_s=bounds.delay.tolist(),
         proofs=held,
@@ -128,21 +129,21 @@ def certify(
 
 def _criterion(
     system: System,
-    motion: Motion,
+    motion: Motion | None,
     criterion: Criterion | str | None,
     *,
     time_varying: bool,
     proofs: int | None,
 ) -> Criterion:
     """The criterion that is asked for, if the question has an answer."""
-    if not isinstance(motion, Motion):
+    if not isinstance(motion, Motion | None):
         raise InputError(f"motion is {motion!r}; load_motion makes a Motion of a file.")
     if proofs is not None and not (isinstance(proofs, int) and proofs >= 1):
         raise InputError(f"proofs is {proofs!r}; it must be a whole number from 1 up, or None.")
     name = system.criterion if criterion is None else criterion
     if name not in set(Criterion):
         raise InputError(f"criterion is {name!r}; it must be {either(list(Criterion))}.")
-    if time_varying and (name == Criterion.PUBLISHED or len(motion) < 2):
+    if time_varying and (name == Criterion.PUBLISHED or motion is None or len(motion) < 2):
         raise InputError(
             "A time-varying bound needs the certified criterion and a motion of more than one "
             "instant (--motion)."
@@ -156,23 +157,31 @@ def design_entries(system: System) -> dict[str, Any]:
     Args:
         system: the design.
     """
+    law, drives = system.law, system.actuators
     return {
         "delay_s": system.delays.d_1,
-        "levels": system.hierarchy.levels(system.robot),
-        "feedback": system.feedback.value,
-        "gravity": system.gravity.value,
-        "stiffness_form": system.hierarchy.form.value,
-        "task_inertia": system.hierarchy.task_inertia.value,
+        "levels": law.levels(system.robot),
+        "feedback": law.signal.name,
+        "gravity": law.gravity.value,
+        "stiffness_form": law.stiffness_form.value,
+        "task_inertia": law.task_inertia.value,
         "joints": system.robot.joints,
-        "D_theta": system.actuators.motor_damping.tolist(),
-        "spring_stiffness": system.actuators.spring_stiffness.tolist(),
-        "spring_damping": system.actuators.spring_damping.tolist(),
-        "viscous_friction": system.actuators.viscous_friction.tolist(),
-        "motor_inertia": system.actuators.shaped_inertia.tolist(),
-        "rotor_inertia": system.actuators.rotor_inertia.tolist(),
-        "torque_bandwidth": [_finite(value) for value in system.actuators.torque_bandwidth],
-        "hashes": {"urdf": system.robot.urdf_sha256, "project": system.sha256},
+        "D_theta": drives.motor_damping.tolist(),
+        "spring_stiffness": drives.spring_stiffness.tolist(),
+        "spring_damping": drives.spring_damping.tolist(),
+        "viscous_friction": drives.viscous_friction.tolist(),
+        "motor_inertia": drives.shaped_inertia.tolist(),
+        "rotor_inertia": drives.rotor_inertia.tolist(),
+        "torque_bandwidth": [_finite(value) for value in drives.torque_bandwidth],
+        "hashes": {
+            "urdf": system.robot.urdf_sha256,
+            "project": "" if system.source is None else system.source.sha256,
+        },
     }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _left_open(system: System, common: Common | None, moving: Moving | None) -> tuple[str, ...]:
@@ -185,36 +194,9 @@ def _left_open(system: System, common: Common | None, moving: Moving | None) -> 
     )
 
 
-def _order(local: Local) -> tuple[float, int]:
-    """By margin, what is not known last; among zeros the most unstable first."""
-    return (np.inf if local.margin_s is None else local.margin_s), -local.unstable
-
-
-def _over_motion(motion: Motion, locals_: list[Local], at: int) -> dict[str, Any]:
-    """Stability and local margin at every instant."""
-    margins = [local.margin_s for local in locals_]
-    known = [margin for margin in margins if margin is not None]
-    unstable = max(local.unstable for local in locals_)
-    return {
-        "critical": Critical(instant=at, time_s=float(motion.time[at])),
-        "stable": False if unstable else (True if len(known) == len(margins) else None),
-        "local_margin_s": min(known, default=None),
-        "first_crossing_s": locals_[at].first_crossing_s,
-        "unstable_modes": unstable,
-        "instant_margins_s": margins,
-        "instant_basis": [Basis.OPEN if m is None else Basis.EXACT for m in margins],
-        "local_loop": locals_[at].loop,
-        "equilibrium": Rest(found=True, moved_rad=0.0) if len(motion) == 1 else None,
-    }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
 def _answer(
     system: System,
-    stack: WholeBodyStack,
+    spaces: Spaces,
     bounds: Bounds,
     *,
     kind: Criterion,
@@ -232,31 +214,34 @@ def _answer(
             f"{time_text(max_delay_s)}{solver}"
         )
     reasons += open_
-    certified, margin = kind is Criterion.CERTIFIED, local.margin_s
-    if (
-        certified
-        and not reasons
-        and not local.unstable
-        and margin is not None
-        and margin < max_delay_s
-    ):
-        reasons.append(
-            f"the law that is run loses its stability at {time_text(margin)}, before its bound: "
-            "it also answers to passive motions of the base, which no bound covers"
-        )
+    if kind is Criterion.CERTIFIED and not reasons:
+        reasons += _undercut(local, bounds.delay)
     return {
         "status": Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
         "criterion": kind,
         "max_delay_s": max_delay_s,
         "max_delay_upper_s": float(bounds.upper[worst]),
-        "asymmetry": _finite(np.max(asymmetry(stack, bounds, kind))),
-        "contraction": _finite(stack.contraction.max()),
+        "asymmetry": _finite(np.max(asymmetry(spaces, bounds, kind))),
+        "contraction": _finite(spaces.contraction.max()),
         "reasons": tuple(reasons),
     }
 
 
+def _undercut(local: Local, bounds: Array) -> list[str]:
+    """Where the law that runs loses a stability that it has, before its bound."""
+    lost = [k for k in local.undercut(bounds) if local.instants[k].delay > 0.0]
+    if not lost:
+        return []
+    k = min(lost, key=lambda at: local.instants[at].delay)
+    return [
+        f"the law that runs loses its stability at {time_text(local.instants[k].delay)} at instant "
+        f"{k}, before its bound of {time_text(float(bounds[k]))}: its matrices change where it "
+        "rests with an error, or it answers to motions of the base, and no bound covers that"
+    ]
+
+
 def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> dict[str, Any]:
-    """The worst instant: which, its limiting direction, and its frozen loop."""
+    """The instant of the smallest bound: which, and its limiting direction."""
     worst = int(np.argmin(bounds.delay))
     y = worst_motion(system, bounds, worst)
     power = system.actuators.motor_damping * np.abs(y) ** 2
@@ -270,6 +255,21 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
         ),
         "worst_motion": [y.real.tolist(), y.imag.tolist()],
         "conservatism": margin / bound if margin is not None and known else None,
+    }
+
+
+def _over_motion(motion: Motion, local: Local) -> dict[str, Any]:
+    """Stability and local margin over all instants."""
+    at = local.critical
+    return {
+        "critical": Critical(instant=at, time_s=float(motion.time[at])),
+        "stable": local.stable,
+        "local_margin_s": local.margin_s,
+        "first_crossing_s": local.first_crossing_s,
+        "unstable_modes": local.unstable_modes,
+        "instant_margins_s": [None if np.isnan(one.delay) else one.delay for one in local.instants],
+        "instant_basis": [one.basis for one in local.instants],
+        "local_loop": None if local.loop is None else stated_loop(local.loop, local.margin),
     }
 
 
@@ -290,52 +290,3 @@ def _shared(bounds: Bounds, common: Common | None, moving: Moving | None) -> dic
         "time_varying_windows": moving.windows if moving else (),
         "left_open": {name: reason for name, reason in open_.items() if reason},
     }
-
-
-def _assumptions(
-    system: System, criterion: Criterion, motion: Motion, local: Local
-) -> tuple[Assumption, ...]:
-    said = {
-        "frozen_coefficients": "coefficients are frozen at each instant (quasi-static: the "
-        "multiplier may differ from instant to instant; `common_multiplier_delay_s` is the bound "
-        "with a single one)",
-        "embedded_damping": "the embedded motor damping D_θ acts without delay",
-        "delay_bound": f"d_1 is at most {time_text(system.delays.d_1)}; it may vary "
-        "below that; where no embedded period is given, packets are sent and taken at once",
-        "one_delay": "the ways up and down count by their sum d_1 alone, since a "
-        "stiffness is all that is fed back; d_2 delays the feedforward and moves no root",
-        "contacts": "contacts neither slip nor lift off",
-    }
-    if system.delays.delayed_torque_feedback:
-        said["torque_feedback"] = (
-            "the embedded torque feedback acts without delay, though the design delays it"
-        )
-    if system.gravity is GravityCompensation.PLANNED:
-        said["planned_gravity"] = (
-            "gravity compensation comes from the plan and has no feedback gradient"
-        )
-    if system.feedback is Feedback.STATIC_JOINT_TANK:
-        said["tank"] = "the energy tank pays for all that u does; u = 0 while it is empty"
-    if len(system.hierarchy.levels(system.robot)) > 2:
-        said["lower_tasks"] = (
-            "a lower task's error is what the tasks above leave of it"
-            if system.task_error is TaskError.CONSISTENT
-            else "lower tasks feed back their whole errors, as printed"
-        )
-    if local.coupled:
-        said["passive_base"] = (
-            "motions of the base that the motors do not determine stand still: what they move of "
-            "x is an input, not part of the delayed loop; the local margin includes them"
-        )
-    if criterion is Criterion.PUBLISHED:
-        said["published_criterion"] = (
-            "the criterion is (29)/(31) as printed: it takes Λ K_x for symmetric, x(θ) for what is "
-            "fed back and gravity for not delayed, and can certify what is unstable"
-        )
-    else:
-        said["passive_not_stable"] = (
-            "passive is not stable: `stable` and the local margin are separate answers"
-        )
-    if len(motion) > 1:
-        said["between_instants"] = "the motion's instants are checked, not what lies between them"
-    return tuple(Assumption(key=key, text=text) for key, text in said.items())

@@ -5,14 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sealag.design._criteria import (
-    PROOF_SHARE,
-    Bounds,
-    task_stiffness,
-)
+from sealag.design._criteria import PROOF_SHARE, Bounds, task_stiffness
 from sealag.design._system import System
 from sealag.errors import SolverError
-from sealag.margin import delay_margin
+from sealag.margin import DelayMargin
 from sealag.passivity import (
     Criterion,
     LocalLoop,
@@ -26,10 +22,7 @@ from sealag.passivity import (
 )
 from sealag.robot import Motion
 from sealag.typing import Array
-from sealag.whole_body import Feedback, Linearisation, WholeBodyStack
-
-COUPLING_TOLERANCE = 1e-6
-"""Share of F from which an answer to passive motions of the base counts."""
+from sealag.whole_body import FrozenLoop, Spaces
 
 POLYTOPE_WINDOW = 20
 """Intervals between instants in one window of the time-varying bound."""
@@ -67,30 +60,6 @@ class Moving:
     W: Array | None
     windows: tuple[Window, ...]
     left_open: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Local:
-    """What is known of the frozen loop at one instant.
-
-    Attributes:
-        margin_s: exact delay margin, s; None if it could not be decided.
-        first_crossing_s: first delay at which roots cross, s; None likewise.
-        unstable: roots with positive real part without delay.
-        coupling: ‖−∂τ_osc/∂z‖ at fixed θ over ‖F‖, z the motions that contacts leave free.
-        loop: the loop; None where the fed-back signal has none.
-    """
-
-    margin_s: float | None
-    first_crossing_s: float | None
-    unstable: int
-    coupling: float
-    loop: LocalLoop | None
-
-    @property
-    def coupled(self) -> bool:
-        """Whether the law answers to passive motions of the base."""
-        return self.coupling > COUPLING_TOLERANCE
 
 
 def common_multiplier(system: System, bounds: Bounds, *, solver: Solver | None) -> Common:
@@ -178,57 +147,28 @@ def worst_motion(system: System, bounds: Bounds, instant: int) -> Array:
     return root * np.linalg.eigh(H)[1][:, -1]
 
 
-def frozen_loop(system: System, motion: Motion, stack: WholeBodyStack, *, instant: int) -> Local:
-    """Exact local margin at an instant, and whether its potential has a minimum.
+def stated_loop(loop: FrozenLoop, margin: DelayMargin | None) -> LocalLoop:
+    """Return a frozen loop as a certificate states it.
 
     Args:
-        system: the design.
-        motion: its instants.
-        stack: the controller's matrices.
-        instant: which one.
+        loop: the loop.
+        margin: its margin; None if it could not be decided.
     """
-    if not np.isfinite(stack.F_theta[instant]).all():
-        return Local(margin_s=None, first_crossing_s=None, unstable=0, coupling=0.0, loop=None)
-    frozen = system.frozen(motion, stack, instant)
-    try:
-        margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries)
-        margin_s, crossing_s = _known(margin.delay), _known(margin.first_crossing)
-        unstable, frequency = margin.unstable_roots, _known(margin.frequency)
-    except SolverError:
-        values = np.linalg.eigvals(frozen.A_0 + frozen.A_1)
-        unstable = int((values.real > 1e-9 * np.abs(values).max()).sum())
-        margin_s, crossing_s, frequency = 0.0 if unstable else None, None, None
-    coupling = 0.0 if system.feedback is Feedback.JOINT else frozen.passive_coupling
-    return Local(
-        margin_s=margin_s,
-        first_crossing_s=crossing_s,
-        unstable=unstable,
-        coupling=coupling,
-        loop=_loop(system, frozen, frequency),
-    )
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else float(value)
-
-
-def _loop(system: System, frozen: Linearisation, frequency: float | None) -> LocalLoop:
-    joints = [f"theta:{name}" for name in system.robot.joints]
-    free = [f"z{k}" for k in range(len(frozen.A_0) // 2 - len(joints))]
+    crosses = margin is not None and math.isfinite(margin.frequency)
     return LocalLoop(
-        A_0=frozen.A_0.tolist(),
-        A_1=frozen.A_1.tolist(),
-        A_e=None,
-        embedded_delay_s=0.0,
-        symmetries=frozen.symmetries.tolist() if frozen.symmetries.size else [],
-        states=[*free, *joints, *(f"d/dt {name}" for name in (*free, *joints))],
-        frequency_rad_s=frequency,
+        A_0=loop.A_0.tolist(),
+        A_1=loop.A_1.tolist(),
+        A_e=loop.A_e.tolist() if loop.A_e.any() else None,
+        embedded_delay_s=loop.embedded_delay,
+        symmetries=loop.symmetries.tolist(),
+        states=list(loop.states),
+        frequency_rad_s=float(margin.frequency) if margin is not None and crosses else None,
     )
 
 
 def instant_proofs(
     system: System,
-    stack: WholeBodyStack,
+    spaces: Spaces,
     bounds: Bounds,
     *,
     kind: Criterion,
@@ -240,7 +180,7 @@ def instant_proofs(
 
     Args:
         system: the design.
-        stack: the controller's matrices.
+        spaces: the law's matrices.
         bounds: of the criterion.
         kind: which criterion.
         count: how many of the smallest bounds; None for all.
@@ -257,7 +197,7 @@ def instant_proofs(
     proofs, missing = [], {}
     for k in (*order[:count].tolist(), *extra):
         try:
-            proofs.append(_proof(system, stack, bounds, kind=kind, instant=k, solver=solver))
+            proofs.append(_proof(system, spaces, bounds, kind=kind, instant=k, solver=solver))
         except SolverError as error:
             missing[k] = str(error)
     return tuple(proofs), missing
@@ -279,7 +219,7 @@ def without(bounds: Bounds, missing: dict[int, str]) -> Bounds:
 
 def _proof(
     system: System,
-    stack: WholeBodyStack,
+    spaces: Spaces,
     bounds: Bounds,
     *,
     kind: Criterion,
@@ -288,10 +228,10 @@ def _proof(
 ) -> Proof:
     D, d, F = system.actuators.motor_damping, float(bounds.delay[instant]), bounds.F[instant]
     if kind is Criterion.PUBLISHED:
-        levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
+        levels = [spaces.level(k) for k in range(len(spaces.levels) - 1)]
         tasks = [(J[instant], Lambda[instant], K_x) for J, Lambda, K_x in levels]
         found = task_multipliers(
-            tasks, D, delay=d, form=system.hierarchy.form.printed, solver=solver
+            tasks, D, delay=d, form=system.law.stiffness_form.printed, solver=solver
         )
         W = [(one.W + one.W.T) / 2.0 for one in found]
     else:
@@ -299,9 +239,9 @@ def _proof(
     return Proof(
         instant=instant,
         delay_s=d,
-        J_star=stack.J_star[instant].tolist(),
-        stiffness=task_stiffness(stack, system, kind)[instant].tolist(),
-        F_gravity=stack.F_gravity[instant].tolist(),
+        J_star=spaces.J_star[instant].tolist(),
+        stiffness=task_stiffness(spaces, system, kind)[instant].tolist(),
+        F_gravity=spaces.F_gravity[instant].tolist(),
         F=F.tolist(),
         W=[block.tolist() for block in W],
         Q=[(block / d).tolist() for block in W],

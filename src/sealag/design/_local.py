@@ -1,7 +1,6 @@
 """Stability and delay margin of the law that runs, decided over all instants of a motion."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
@@ -9,6 +8,7 @@ from sealag.design._criteria import ASYMMETRY_TOLERANCE, Bounds
 from sealag.design._system import System
 from sealag.errors import ContractionError, SolverError
 from sealag.margin import DelayMargin, delay_margin
+from sealag.passivity import Basis
 from sealag.robot import Motion
 from sealag.typing import Array
 from sealag.whole_body import FrozenLoop, LinkPlant, Rest, Spaces
@@ -19,17 +19,6 @@ MOST_EXACT = 600
 _FEW = 50  # instants up to which all are decided, also once one is known to be unstable
 _AT_REST = 1e-9  # share of weight and torques that springs and contacts may leave over at a posture
 _MINIMUM = 1e-9  # share of the largest curvature above which a potential has a strict minimum
-
-
-class Basis(StrEnum):
-    """How the margin of an instant is known."""
-
-    EXACT = "exact"
-    """It is the margin itself."""
-    BOUND = "bound"
-    """The loop is stable without delay, and its passive bound lies below its margin."""
-    OPEN = "open"
-    """It was not decided."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +128,9 @@ class _Decision:
     def __init__(self, system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> None:
         self._system, self._motion, self._spaces, self._bounds = system, motion, spaces, bounds
         self._found: list[InstantMargin] = [OPEN] * len(motion)
-        self._best: tuple[DelayMargin | None, FrozenLoop | None, Rest | None, str, int] | None = None
+        self._best: tuple[DelayMargin | None, FrozenLoop | None, Rest | None, str, int] | None = (
+            None
+        )
         self._exact = 0
 
     def run(self) -> Local:

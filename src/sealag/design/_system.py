@@ -15,7 +15,16 @@ from sealag.errors import InputError
 from sealag.passivity import Criterion
 from sealag.robot import Contact, Motion, Robot, require_within_limits
 from sealag.typing import Array, ArrayLike
-from sealag.whole_body import Controller, FrozenLoop, Law, Rest, Spaces, freeze, rest_of, spaces_along
+from sealag.whole_body import (
+    Controller,
+    FrozenLoop,
+    Law,
+    Rest,
+    Spaces,
+    freeze,
+    rest_of,
+    spaces_along,
+)
 
 if TYPE_CHECKING:
     from sealag.simulation import Run
@@ -98,6 +107,23 @@ class System:
         for contact in self.contacts:
             self.robot.check_frame(contact.frame)
         self.law.gain(self.robot)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Every file that it was read from; none of these may be overwritten."""
+        if self.source is None:
+            return (self.robot.urdf_path,)
+        return self.source.files
+
+    @property
+    def text(self) -> str:
+        """The project file's text; empty if it was built in Python."""
+        return "" if self.source is None else self.source.text
+
+    @property
+    def motion_file(self) -> Path | None:
+        """The project's own motion, if it names one."""
+        return None if self.source is None else self.source.motion_file
 
     def still(self) -> Motion:
         """Return the posture as a motion of one instant."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sealag.actuation import Actuators, actuators
 from sealag.errors import InputError
 from sealag.typing import Array
-from sealag.actuation import Actuators, actuators
 from sealag.whole_body import (
     SIGNAL_NAMES,
     FrozenLoop,
@@ -170,9 +170,7 @@ def _task_stiffness(kind: StiffnessForm, Lambda: Array, K_x: Array) -> Array:
     return root @ np.diag(K_x) @ root
 
 
-def _frozen_loop(
-    M: Array, G: Array, drives: Actuators, *, F: Array, links: bool
-) -> FrozenLoop:
+def _frozen_loop(M: Array, G: Array, drives: Actuators, *, F: Array, links: bool) -> FrozenLoop:
     none = np.zeros_like(F)
     C_z, C_theta = (-F, none) if links else (none, -F)
     return sea_loop(drives, M=M, H=G, S=np.eye(len(F)), C_z=C_z, C_theta=C_theta)

@@ -283,7 +283,10 @@ def _motor_rows(actuators: Actuators, *, instant: bool) -> _MotorRows:
     from sealag.kernels import motor
 
     moved = (motor.ANGLE, motor.SPEED, motor.TORQUE, motor.LINK, motor.LINK_SPEED)
-    A, forms = np.zeros((motor.SIZE, motor.SIZE)), np.zeros((motor.PRODUCTS, motor.SIZE, motor.SIZE))
+    A, forms = (
+        np.zeros((motor.SIZE, motor.SIZE)),
+        np.zeros((motor.PRODUCTS, motor.SIZE, motor.SIZE)),
+    )
     every = []
     for one in motor_parameters(actuators):
         motor.generator(one, 1.0 if instant else 0.0, motor.REGULAR, A, forms)

@@ -30,6 +30,8 @@ class Rest:
 
     Attributes:
         q: (nq,) configuration; the posture itself if none was found.
+        fed_back: (nq,) configuration that the law takes its matrices at, moved from q to the angles
+            of its signal.
         theta: (n,) motor angles, rad.
         tau_sea: (n,) spring torque there, Nm.
         found: whether all balances: links, springs, motors and contacts.
@@ -38,6 +40,7 @@ class Rest:
     """
 
     q: Array
+    fed_back: Array
     theta: Array
     tau_sea: Array
     found: bool
@@ -86,7 +89,9 @@ class _Search:
         K = actuators.spring_stiffness
         self._robot, self._K, self._posture = robot, K, np.asarray(posture, dtype=float)
         evaluation = LawEvaluation(robot, law, K, contacts=contacts, posture=posture)
+        self._evaluation = evaluation
         self._signal: SignalState = law.signal.start(evaluation, delay_bound=0.0)
+        self._limit = actuators.torque_limit
         self._plant = LinkPlant(robot, contacts)
         self._places = self._plant.places(self._posture)
         self._scale = max(9.81 * robot.mass, float(np.abs(robot.gravity(posture)).max()), 1e-3)
@@ -98,7 +103,7 @@ class _Search:
             residual = self._residual(q, theta)
             for _ in range(_ROUNDS):
                 if self._small(residual):
-                    return self._answer(q, theta, "")
+                    return self._answer(q, theta, self._overload(q, theta))
                 step = self._newton(q, theta, residual)
                 q, theta, residual, better = self._search(q, theta, step, residual)
                 if not better:
@@ -197,11 +202,31 @@ class _Search:
             )
         return "no balance of springs, gravity and law was found near the posture"
 
+    def _overload(self, q: Array, theta: Array) -> str:
+        """Which motor cannot give the torque of this rest; empty if all can."""
+        torque = np.abs(self._K * (theta - self._robot.joint_positions(q)))
+        over = np.flatnonzero(torque > self._limit)
+        if not len(over):
+            return ""
+        i = over[0]
+        return (
+            f"the motor of {self._robot.joints[i]} gives at most {self._limit[i]:g} Nm, and to hold "
+            f"the posture it needs {torque[i]:.3g} Nm"
+        )
+
+    def _fed_back(self, q: Array, theta: Array) -> Array:
+        try:
+            self._signal.settled(q, theta, np.zeros(self._robot.n))
+        except ContractionError:
+            return q
+        return self._evaluation.configuration(q)
+
     def _answer(self, q: Array, theta: Array, reason: str) -> Rest:
         joints = self._robot.joint_positions(q)
         moved = np.abs(joints - self._robot.joint_positions(self._posture))
         return Rest(
             q=q,
+            fed_back=self._fed_back(q, theta),
             theta=theta,
             tau_sea=self._K * (theta - joints),
             found=not reason,

@@ -438,9 +438,7 @@ class _Filled:
         law, m = self._law, self._law.rows
         target, command = np.zeros(m), np.zeros(law.robot.n)
         self._target(q, theta, target)
-        C_q, C_theta = _differences(
-            law, lambda a, b, out: self._at(a, b, target, out), q, theta
-        )
+        C_q, C_theta = _differences(law, lambda a, b, out: self._at(a, b, target, out), q, theta)
         self._at(q, theta, target, command)
         J, C = law.space.J_star.copy(), -law.space.J_star.T @ law.space.stiffness
         if not self._tank.can_pay:

@@ -161,9 +161,7 @@ class _SpacesAt(NamedTuple):
     J_t: Array  # (N, m, nv)
 
 
-def _spaces_at(
-    robot: Robot, law: Law, q: Array, *, contacts: Sequence[Contact]
-) -> _SpacesAt:
+def _spaces_at(robot: Robot, law: Law, q: Array, *, contacts: Sequence[Contact]) -> _SpacesAt:
     stack = stack_terms(robot, q, contacts, rows=law.rows(robot))
     return _solved(
         robot,
@@ -206,7 +204,13 @@ def _solved(
 
 
 def _singular(
-    robot: Robot, law: Law, q: Array, at: _SpacesAt, *, contacts: Sequence[Contact], levels: list[int]
+    robot: Robot,
+    law: Law,
+    q: Array,
+    at: _SpacesAt,
+    *,
+    contacts: Sequence[Contact],
+    levels: list[int],
 ) -> BoolArray:
     """Whether configurations (N, nq) have fewer directions than those a little beside them.
 
