@@ -18,8 +18,10 @@ from sealag.errors import FileError, RobotError, UnknownNameError, either, near
 from sealag.files import read_whole
 from sealag.robot._mimic import Coupling, Follower, read_followers
 from sealag.robot._urdf import LEAST_INERTIA, ROOT_JOINT, check_urdf, joint_dynamics
+from sealag.typing import Array
 
 LARGEST_URDF_BYTES = 50_000_000
+_ROUNDED = 0.05  # of the largest moment: what two significant digits do to a plate's
 _SINGULAR = 1e-9  # least eigenvalue of the mass matrix scaled to a unit diagonal
 
 
@@ -132,8 +134,28 @@ def read_model(path: Path, *, floating_base: bool) -> Description:
     said = "; ".join(errors) or reason
     if model is None or said:
         raise RobotError(f"{path} cannot be read as a robot: {said.rstrip('.')}.")
+    _check_bodies(model, path)
     dynamics = {j.get("name", ""): joint_dynamics(j) for j in root.iterfind("joint")}
     return Description(model, followers, dynamics, hashlib.sha256(content).hexdigest())
+
+
+def _check_bodies(model: Any, path: Path) -> None:
+    """Refuse what moves as one if no rigid body can have its inertia (triangle inequality)."""
+    links = _links(model)
+    for number, body in enumerate(model.inertias[1:], start=1):
+        least, middle, largest = np.linalg.eigvalsh(body.inertia)
+        if largest - middle - least > _ROUNDED * max(largest, LEAST_INERTIA):
+            raise RobotError(
+                f"{path}: link {links[number]} has, with what is fixed to it, principal moments of "
+                f"inertia {least:.3g}, {middle:.3g} and {largest:.3g} kg m²; no body's largest one "
+                "exceeds the sum of the others (triangle inequality): correct <inertia> there."
+            )
+
+
+def _links(model: Any) -> dict[int, str]:
+    """The first link that each joint moves, by the joint's number."""
+    bodies = (f for f in reversed(model.frames) if f.type == pin.FrameType.BODY)
+    return {frame.parentJoint: frame.name for frame in bodies}
 
 
 def _unlimit(joint: ElementTree.Element) -> None:
@@ -186,13 +208,12 @@ def check_inertias(model: Any, coupling: Coupling, path: Path) -> None:
     values, vectors = np.linalg.eigh(M / np.outer(size, size))
     weak = (own < LEAST_INERTIA) | ((values[0] < _SINGULAR) & (np.abs(vectors[:, 0]) > 0.3))
     if weak.any():
-        links = {
-            f.parentJoint: f.name for f in reversed(model.frames) if f.type == pin.FrameType.BODY
-        }
+        links = _links(model)
+        velocities = coupling.restrict(np.arange(model.nv))[weak]
         moved = [
             k
             for k, j in enumerate(model.joints)
-            if k and (weak & (coupling.T[j.idx_v : j.idx_v + j.nv] != 0.0)).any()
+            if k and ((velocities >= j.idx_v) & (velocities < j.idx_v + j.nv)).any()
         ]
         names = ", ".join(f"{links.get(k, '?')} (joint {model.names[k]})" for k in moved)
         raise RobotError(
@@ -244,7 +265,7 @@ def reduce_model(
             at[model.joints[number].idx_q] = followers[name].offset
         if name not in names and name not in driven:
             locked.append(number)
-    reduced = pin.buildReducedModel(model, locked, at) if locked else model
+    reduced = _lock(model, locked, at) if locked else model
     for name in names:
         if reduced.joints[reduced.getJointId(name)].nv != 1:
             raise RobotError(
@@ -252,6 +273,23 @@ def reduce_model(
                 "actuated joints must be revolute, continuous or prismatic."
             )
     return reduced, driven
+
+
+def _lock(model: Any, joints: Sequence[int], at: Array) -> Any:
+    """The model with joints locked where a configuration has them.
+
+    Pinocchio looks for frames by the joints' names alone, which links may share: theirs are others
+    meanwhile.
+    """
+    mark = "link of the URDF: "
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY:
+            frame.name = mark + frame.name
+    reduced = pin.buildReducedModel(model, joints, at)
+    for frame in (*model.frames, *reduced.frames):
+        if frame.type == pin.FrameType.BODY:
+            frame.name = frame.name.removeprefix(mark)
+    return reduced
 
 
 def _follows(name: str, follower: Follower, path: Path) -> RobotError:
