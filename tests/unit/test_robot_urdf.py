@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from helpers.mimics import MIMICS, joint, link, robot
-from sealag.errors import RobotError, SealagError
+from sealag.errors import RobotError, SealagError, UnknownNameError
 from sealag.robot import Contact, Follower, example_robot_path, load_robot
 
 ARM = (link("base"), link("a"), link("b"), joint("j", "base", "a"), joint("k", "a", "b"))
@@ -146,6 +146,8 @@ def test_followers_are_told_with_the_joint_that_leads(tmp_path):
     assert followers["slide"] == Follower(leader="lead", multiplier=-0.5, offset=0.1)
     assert followers["chain"] == Follower(leader="lead", multiplier=-1.5, offset=0.5)
     assert followers["chain"].position(2.0) == pytest.approx(-2.5)
+    with pytest.raises(UnknownNameError, match="chain of r follows lead"):
+        read(tmp_path, MIMICS).configuration({"chain": 0.1})
 
 
 def test_damping_and_friction_count_in_the_leaders_coordinates(tmp_path):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from sealag.errors import InputError, near
+from sealag.errors import InputError, UnknownNameError, near
 from sealag.robot._contact import Contact
 from sealag.robot._mimic import Coupling, Follower, couple
 from sealag.robot._tree import Mounts, Tree, frame_mounts, tree_of
@@ -144,8 +144,14 @@ class Robot:
             name: an actuated joint.
 
         Raises:
-            UnknownNameError: there is no such joint.
+            UnknownNameError: there is no such joint, or it follows another one.
         """
+        if name in self.followers:
+            leader = self.followers[name].leader
+            raise UnknownNameError(
+                f"Joint {name} of {self.name} follows {leader} and has no position of its own; "
+                f"give that of {leader}."
+            )
         if name not in self.joints:
             raise near(name, self.joints, what=f"actuated joint of {self.name}")
         return self.joints.index(name)

@@ -151,7 +151,9 @@ def _check_inertias(root: Element, path: Path) -> None:
     Deviations are measured against the largest moments of the link and of all that is fixed to it:
     what small parts get wrong is not what moves, which `check_bodies` looks at.
     """
-    moments = {link.get("name", ""): _principal_moments(link, path) for link in root.iter("link")}
+    moments = {
+        link.get("name", ""): _principal_moments(link, path) for link in root.iterfind("link")
+    }
     body = {name: name for name in moments}
 
     def rigid(name: str) -> str:
