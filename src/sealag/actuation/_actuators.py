@@ -139,11 +139,12 @@ def joint_values(
     return np.array(array)
 
 
-def motor_parameters(actuators: Actuators) -> Array:
-    """Return the actuators as the motor kernels take them, (n, 10).
+def motor_parameters(actuators: Actuators, joint_damping: ArrayLike = 0.0) -> Array:
+    """Return the joints as the motor kernels take them, (n, 11).
 
     Args:
         actuators: springs, motors and drives.
+        joint_damping: (n,) or one number, of the links' side, Nms/rad.
     """
     columns = [
         actuators.spring_stiffness,
@@ -156,5 +157,6 @@ def motor_parameters(actuators: Actuators) -> Array:
         actuators.torque_limit,
         actuators.velocity_limit,
         actuators.torque_bandwidth,
+        np.broadcast_to(joint_damping, actuators.n),
     ]
     return np.ascontiguousarray(np.stack(columns, axis=1), dtype=float)

@@ -1,7 +1,7 @@
 """Delays over time, the bounds that the criterion needs, and links that carry packets late."""
 
-from sealag.delay._delays import Delays, RoundTrip
-from sealag.delay._line import DelayLine, Link, PacketOrder
+from sealag.delay._delays import UNSTATED_PERIOD, Delays, RoundTrip
+from sealag.delay._link import Link, PacketOrder
 from sealag.delay._signal import (
     Constant,
     DelaySignal,
@@ -13,8 +13,8 @@ from sealag.delay._signal import (
 )
 
 __all__ = [
+    "UNSTATED_PERIOD",
     "Constant",
-    "DelayLine",
     "DelaySignal",
     "Delays",
     "Link",

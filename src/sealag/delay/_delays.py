@@ -3,11 +3,14 @@
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
-from sealag.delay._line import Link, PacketOrder
+from sealag.delay._link import Link, PacketOrder
 from sealag.delay._signal import DelaySignal, Share
 from sealag.errors import InputError
 from sealag.typing import Array
 from sealag.units import LONGEST_DELAY_S, check_delay_s
+
+UNSTATED_PERIOD = 1e-3
+"""Period of a controller that runs where none is stated, s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +54,11 @@ class RoundTrip:
     def upper_bound(self) -> float:
         """Sum of both ways' largest delays, s."""
         return self.up.delay.upper_bound + self.down.delay.upper_bound
+
+    @property
+    def lower_bound(self) -> float:
+        """Sum of both ways' smallest delays, s."""
+        return self.up.delay.lower_bound + self.down.delay.lower_bound
 
     @property
     def mean(self) -> float:
@@ -190,6 +198,15 @@ class Delays:
         """
         down = self.central.down.delay.at(t) + self.embedded.down.delay.at(t)
         return down + 0.5 * self.sample_time
+
+    def sampled(self) -> "Delays":
+        """Return the delays of a controller that runs: with a period, whose hold counts.
+
+        A continuous controller gets the embedded period, or UNSTATED_PERIOD.
+        """
+        return replace(
+            self, sample_time=self.sample_time or self.embedded_period or UNSTATED_PERIOD
+        )
 
     def scaled(self, factor: float) -> "Delays":
         """Return the same connections with all delays and jitters times a factor.

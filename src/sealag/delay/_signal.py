@@ -20,6 +20,11 @@ class DelaySignal(Protocol):
         ...
 
     @property
+    def lower_bound(self) -> float:
+        """Return the smallest delay that occurs, s."""
+        ...
+
+    @property
     def mean(self) -> float:
         """Return the mean delay, s."""
         ...
@@ -52,6 +57,11 @@ class Constant:
 
     @property
     def upper_bound(self) -> float:
+        """The value itself, s."""
+        return self.value
+
+    @property
+    def lower_bound(self) -> float:
         """The value itself, s."""
         return self.value
 
@@ -106,6 +116,11 @@ class Sinusoid:
         """The mean plus the amplitude, s."""
         return self.mean + self.amplitude
 
+    @property
+    def lower_bound(self) -> float:
+        """The mean less the amplitude, s."""
+        return self.mean - self.amplitude
+
     def at(self, t: float | Array) -> float | Array:
         """Return the delay.
 
@@ -148,6 +163,11 @@ class Table:
     def upper_bound(self) -> float:
         """The largest entry, s."""
         return float(self.delay.max())
+
+    @property
+    def lower_bound(self) -> float:
+        """The smallest entry, s."""
+        return float(self.delay.min())
 
     @property
     def mean(self) -> float:
@@ -232,6 +252,11 @@ class Share:
     def upper_bound(self) -> float:
         """The multiple of the signal's upper bound, s."""
         return self.fraction * self.signal.upper_bound
+
+    @property
+    def lower_bound(self) -> float:
+        """The multiple of the signal's lower bound, s."""
+        return self.fraction * self.signal.lower_bound
 
     @property
     def mean(self) -> float:

@@ -12,7 +12,7 @@ from sealag.design._system import System
 from sealag.design._walking import Walking
 from sealag.errors import InputError, either
 from sealag.locomotion import FlatTerrain, begin_walk
-from sealag.passivity import DelayStorage, joint_multiplier
+from sealag.passivity import joint_multiplier
 from sealag.robot import Contact, ContactKind
 from sealag.simulation import (
     Clock,
@@ -23,6 +23,8 @@ from sealag.simulation import (
     Run,
     Scene,
     closed_loop,
+    delay_store,
+    fastest_link,
     require_hold,
     touching_posture,
 )
@@ -31,13 +33,15 @@ from sealag.whole_body import Controller, TaskKind, TickController
 
 SCENARIOS = ("regulate", "track", "drop", "balance", "walk")
 LONGEST_STEP = 1e-3
-"""Longest physics step, and central period where the project states none, s."""
+"""Longest physics step, s."""
 SHORTEST_STEP = 1e-5
 """Shortest physics step that is chosen where the project states none, s."""
 LONGEST_RUN = 1e9
 """s."""
 STEPS_PER_SWING = 8
 """Least number of physics steps in a period of the fastest spring."""
+FINER = 4
+"""How many times finer a step may become to divide the delays."""
 
 _FALL = FallLimits()
 _SPOT_SPEED = 1e-3  # m/s
@@ -87,7 +91,7 @@ def simulate(
     if not (isinstance(length, int | float) and 0.0 < length <= LONGEST_RUN):
         raise InputError(f"The duration is {length!r} s; it must be more than 0, at most 1e9 s.")
     clock = _clock(system)
-    _check_pushes(system, length, step=clock.physics)
+    _check_pushes(system, length)
     common = {
         "duration": length,
         "network": Network.from_delays(system.delays.scaled(delay_scale)),
@@ -144,13 +148,13 @@ def _with_delay_storage(run: Run, system: System, q: Array) -> Run:
         return run
     motion = replace(system.still(), q=q[None])
     bounds = certified_bounds(system.spaces(motion), system)
-    delay, step = float(bounds.delay[0]), float(run.time[1] - run.time[0])
-    if not step <= delay < math.inf:
+    delay = float(bounds.delay[0])
+    if not 0.0 < delay < math.inf:
         return run
     Y = joint_multiplier(bounds.F[0], system.actuators.motor_damping, delay)
-    window = DelayStorage(Y=Y, delay=delay, step=step)
-    stored = np.array([window.update(rate) for rate in run.theta_dot])
-    return replace(run, audit=replace(run.audit, delay_storage=stored))
+    stored, error = delay_store(run.time, run.theta, run.theta_dot, Y, delay=delay)
+    audit = replace(run.audit, delay_storage=stored, delay_storage_error=error)
+    return replace(run, audit=audit)
 
 
 def scenario_duration(system: System, scenario: str | None = None) -> float:
@@ -278,7 +282,7 @@ def _pushes(system: System, kind: str) -> list[Push]:
     return pushes
 
 
-def _check_pushes(system: System, length: float, *, step: float) -> None:
+def _check_pushes(system: System, length: float) -> None:
     """Refuse pushes of the project that would not act."""
     for push in system.simulation.pushes:
         if push.start_s >= length:
@@ -286,35 +290,26 @@ def _check_pushes(system: System, length: float, *, step: float) -> None:
                 f"The push on {push.frame} begins at {push.start_s:g} s, but the run ends at "
                 f"{length:g} s; push earlier or simulate longer."
             )
-        if push.duration_s < step:
-            raise InputError(
-                f"The push on {push.frame} lasts {push.duration_s:g} s, less than a physics step "
-                f"of {step:g} s; push longer."
-            )
 
 
 def _clock(system: System) -> Clock:
-    """The design's own periods; 1 ms for a continuous controller, and physics fine enough for the
-    springs."""
-    delays = system.delays
-    central = delays.sample_time or delays.embedded_period or LONGEST_STEP
-    embedded = delays.embedded_period
-    step = system.simulation.physics_step_ms
-    if step is not None:
-        return Clock(physics=step * 1e-3, embedded=embedded, central=central)
+    """The design's own periods, and physics fine enough for springs and dampers.
+
+    Where a step not much finer divides the constant delays too, no step has to be split for them.
+    """
+    delays = system.delays.sampled()
+    central, embedded = delays.sample_time, delays.embedded_period
+    if system.simulation.physics_step_ms is not None:
+        step = system.simulation.physics_step_ms * 1e-3
+        return Clock(physics=step, embedded=embedded, central=central)
+    rate, _ = fastest_link(system.robot, system.actuators, system.posture)
+    longest = max(SHORTEST_STEP, 2.0 * math.pi / (STEPS_PER_SWING * rate))
     whole = embedded or central
-    longest = min(LONGEST_STEP, max(SHORTEST_STEP, _fastest_swing(system) / STEPS_PER_SWING))
-    return Clock(
-        physics=whole / math.ceil(whole / longest - 1e-9), embedded=embedded, central=central
-    )
-
-
-def _fastest_swing(system: System) -> float:
-    """Shortest period of the bodies on their springs, motors locked, feet in the air, s."""
-    from scipy.linalg import eigh
-
-    robot = system.robot
-    springs = np.zeros(robot.nv)
-    springs[-robot.n :] = system.actuators.spring_stiffness
-    squares = eigh(np.diag(springs), robot.mass_matrix(system.posture), eigvals_only=True)
-    return 2.0 * math.pi / math.sqrt(squares[-1])
+    coarsest = math.ceil(whole / min(LONGEST_STEP, longest) - 1e-9)
+    links = (delays.central.up, delays.central.down, delays.embedded.down)
+    constant = [link.delay.upper_bound for link in links if link.constant]
+    for count in range(coarsest, FINER * coarsest + 1):
+        parts = [delay * count / whole for delay in constant]
+        if all(abs(part - round(part)) < 1e-9 * max(1.0, part) for part in parts):
+            return Clock(physics=whole / count, embedded=embedded, central=central)
+    return Clock(physics=whole / coarsest, embedded=embedded, central=central)

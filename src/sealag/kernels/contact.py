@@ -203,14 +203,15 @@ def _contact_power(C, velocity, force, closed, out):
 
 @njit(cache=True)
 def _apply(nle, joint, parameters, z, v, load, J, velocity, tau, right):
-    """Write spring torques and all applied generalised forces; return the power of the loads."""
+    """Write spring torques and all applied generalised forces, the damping of the joints among
+    them; return the power of the loads."""
     nv, n = v.size, joint.size
     for i in range(nv):
         right[i] = -nle[i]
     for i in range(n):
         tau[i] = parameters[i, 0] * (z[i, 0] - joint[i])
         tau[i] += parameters[i, 1] * (z[i, 1] - v[nv - n + i])
-        right[nv - n + i] += tau[i]
+        right[nv - n + i] += tau[i] - parameters[i, 10] * v[nv - n + i]
     power = 0.0
     for k in range(load.shape[0]):
         for a in range(3):
@@ -320,7 +321,7 @@ def example():
         np.zeros((0, 3)),
     )  # fmt: skip
     tree, terms = dynamics.example(nv)
-    parameters = np.array([[350.0, 0.0, 0.1, 2.0, 10.0, 0.0, 0.1, np.inf, np.inf, np.inf]])
+    parameters = np.array([[350.0, 0.0, 0.1, 2.0, 10.0, 0.0, 0.1, np.inf, np.inf, np.inf, 0.0]])
     state, data = (np.ones(1, np.int64), np.zeros(1)), np.zeros(memory_size(sizes))
     data[6] = 1.0
     return tree, terms, around, state, (50.0, 1e-3), parameters, data, sizes

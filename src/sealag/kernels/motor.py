@@ -4,11 +4,12 @@ A joint's vector z (9,) is [theta, theta_dot, motor torque state, q, q̇, q̈, q
 is a cubic over the step, u is the held command, w a constant torque on the rotor. z obeys
 ż = A z, so z and the integrals of products of its entries follow from exponentials alone.
 
-``parameters`` (n, 10) columns: K, D_s, B, B / B_s, D_theta, viscous friction, Coulomb friction,
-torque limit, velocity limit, torque bandwidth (rad/s, inf if ideal). ``instant`` is 1.0 if the
-embedded torque feedback is not delayed.
+``parameters`` (n, 11) columns: K, D_s, B, B / B_s, D_theta, viscous friction, Coulomb friction,
+torque limit, velocity limit, torque bandwidth (rad/s, inf if ideal), and the damping of the joint's
+bearing on the link's side, which no motor feels. ``instant`` is 1.0 if the embedded torque feedback
+is not delayed.
 
-Works (n, 7): ∫θ̇², ∫τ_sea q̇, ∫τ_sea θ̇, ∫(θ̇ − q̇)², ∫τ_m θ̇, ∫|θ̇| (Coulomb), ∫τ_osc θ̇.
+Works (n, 8): ∫θ̇², ∫τ_sea q̇, ∫τ_sea θ̇, ∫(θ̇ − q̇)², ∫τ_m θ̇, ∫|θ̇| (Coulomb), ∫τ_osc θ̇, ∫q̇².
 """
 
 import math
@@ -290,6 +291,16 @@ def link_cubic(z, q_0, v_0, q_1, v_1, step):
 
 
 @njit(cache=True)
+def add_link_work(z, step, work):
+    """Add ∫q̇² of every joint (n, 8) along the cubic that `link_cubic` has set."""
+    for i in range(z.shape[0]):
+        a, b, c = z[i, 4], z[i, 5] * step, 0.5 * z[i, 6] * step**2
+        work[i, 7] += step * (
+            a * a + a * b + (b * b + 2.0 * a * c) / 3.0 + 0.5 * b * c + 0.2 * c * c
+        )
+
+
+@njit(cache=True)
 def _add_works(W, z, after, tau_osc, work):
     """Add zᵀ W_k z of the symmetric forms, and the works that follow from the way travelled."""
     for k in range(PRODUCTS):
@@ -309,7 +320,7 @@ def _add_works(W, z, after, tau_osc, work):
 def move(
     parameters, instant, tau_osc, tau_measured, z, step, tables_E, tables_W, regular, book, work
 ):
-    """Move every joint over the step along its link's cubic; if ``book``, add its works (n, 7)."""
+    """Move every joint over the step along its link's cubic; if ``book``, add its works (n, 8)."""
     A = np.empty((SIZE, SIZE))
     Q = np.empty((PRODUCTS, SIZE, SIZE))
     E = np.empty((SIZE, SIZE))
@@ -380,6 +391,7 @@ def tally(parameters, work, powers, step, z, q, power, joint, scalar, energy, mo
         joint[5, i] += parameters[i, 5] * work[i, 0]
         joint[6, i] += parameters[i, 6] * work[i, 5]
         joint[7, i] += parameters[i, 1] * work[i, 3]
+        joint[8, i] += parameters[i, 10] * work[i, 7]
     for k in range(4):
         mean = powers[0, k] + 2.0 * (powers[1, k] + powers[2, k]) + powers[3, k]
         scalar[k] += step / 6.0 * mean
@@ -391,15 +403,16 @@ def tally(parameters, work, powers, step, z, q, power, joint, scalar, energy, mo
 
 def warm() -> None:
     """Compile every kernel with the types used in practice."""
-    parameters = np.array([[350.0, 0.0, 0.1, 2.0, 10.0, 0.0, 0.1, np.inf, np.inf, np.inf]])
+    parameters = np.array([[350.0, 0.0, 0.1, 2.0, 10.0, 0.0, 0.1, np.inf, np.inf, np.inf, 0.0]])
     half, whole = np.empty((1, 4, SIZE, SIZE)), np.empty((1, 4, SIZE, SIZE))
     forms = np.empty((1, 4, PRODUCTS, SIZE, SIZE))
     tables(parameters, 1.0, 1e-3, half, whole, forms)
-    z, tau, work, ahead = np.zeros((1, SIZE)), np.zeros(1), np.zeros((1, 7)), np.zeros((1, 2, 2))
+    z, tau, work, ahead = np.zeros((1, SIZE)), np.zeros(1), np.zeros((1, 8)), np.zeros((1, 2, 2))
     predict(parameters, 1.0, tau, tau, z, 1e-3, half, whole, True, ahead)
     link_cubic(z, tau, tau, tau, tau, 1e-3)
+    add_link_work(z, 1e-3, work)
     move(parameters, 1.0, tau, tau, z, 1e-3, whole, forms, True, True, work)
-    energy, joint, scalar = np.zeros(4), np.zeros((8, 1)), np.zeros(5)
+    energy, joint, scalar = np.zeros(4), np.zeros((9, 1)), np.zeros(5)
     stores(parameters, z, tau, np.zeros(6), energy)
     powers = np.zeros((4, 6))
     tally(parameters, work, powers, 1e-3, z, tau, powers[0], joint, scalar, energy, np.zeros(1))

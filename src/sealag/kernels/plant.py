@@ -10,7 +10,7 @@ from sealag.kernels.contact import evaluate, example, motion
 @njit(cache=True)
 def memory_size(nv, n):
     """Return how many numbers `shared` divides."""
-    return 8 * nv + 24 + 4 * n + nv + 7 * n
+    return 8 * nv + 24 + 4 * n + nv + 8 * n
 
 
 @njit(cache=True)
@@ -18,13 +18,13 @@ def shared(memory, nv, n):
     """Return the named parts of a step's memory.
 
     Rates (4, nv), accelerations (4, nv) and powers (4, 6) of the stages, motor angles and speeds
-    half a step and a step ahead (n, 2, 2), a displacement (nv,), and the joints' works (n, 7).
+    half a step and a step ahead (n, 2, 2), a displacement (nv,), and the joints' works (n, 8).
     """
     ends = 8 * nv + 24, 8 * nv + 24 + 4 * n, 9 * nv + 24 + 4 * n
     return (
         memory[: 4 * nv].reshape(4, nv), memory[4 * nv : 8 * nv].reshape(4, nv),
         memory[8 * nv : ends[0]].reshape(4, 6), memory[ends[0] : ends[1]].reshape(n, 2, 2),
-        memory[ends[1] : ends[2]], memory[ends[2] :].reshape(n, 7),
+        memory[ends[1] : ends[2]], memory[ends[2] :].reshape(n, 8),
     )  # fmt: skip
 
 
@@ -109,6 +109,8 @@ def _close(q, v, z, end, parts, motors, step, regular, book):
     end_z[:] = z
     motor.link_cubic(end_z, q[q.size - n :], v[base:], end_q[q.size - n :], end_v[base:], step)
     work[:] = 0.0
+    if book:
+        motor.add_link_work(end_z, step, work)
     motor.move(
         parameters, instant, tau_osc, tau_measured, end_z, step, whole, forms, regular, book, work
     )

@@ -1,20 +1,24 @@
 """The delayed robot, simulated: plant, contact, links, closed loop and energy audit."""
 
 from sealag.simulation._audit import Audit, Passivity
+from sealag.simulation._delay_store import delay_store
+from sealag.simulation._exchange import Ages, Exchanges
 from sealag.simulation._ground import FlatGround, Foot, Ground
 from sealag.simulation._hold import Hold, require_hold, static_hold, touching_posture
 from sealag.simulation._loop import closed_loop
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import EventKind, Outcome, PlantStop
-from sealag.simulation._plant import ContactEvent, Plant
+from sealag.simulation._plant import ContactEvent, Plant, fastest_link
 from sealag.simulation._run import Run
 from sealag.simulation._scene import FallLimits, Push, Scene
 
 __all__ = [
+    "Ages",
     "Audit",
     "Clock",
     "ContactEvent",
     "EventKind",
+    "Exchanges",
     "FallLimits",
     "FlatGround",
     "Foot",
@@ -29,6 +33,8 @@ __all__ = [
     "Run",
     "Scene",
     "closed_loop",
+    "delay_store",
+    "fastest_link",
     "require_hold",
     "static_hold",
     "touching_posture",

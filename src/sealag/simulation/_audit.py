@@ -11,13 +11,15 @@ rotor inertia B_s as in the storage function S_j = V_1:
 - controller side: -∫(τ_osc - D_θ θ̇)ᵀθ̇ dt - (V_3 - V_3(0)) >= 0, the slack being V_4 (what the
   delay line stores) and what was dissipated.
 
-What the command gives besides V_3 has two sources. The delay's, ∫(τ_osc - τ_now)ᵀθ̇ dt with τ_now
+What the command gives besides V_3 has two sources. The delay's, ∫(τ_osc - τ_now)ᵀdθ with τ_now
 the undelayed command, is what a certificate bounds: it stays below ∫D_θ θ̇² dt. The law's own,
-∫τ_nowᵀθ̇ dt + V_3 - V_3(0), is zero where the law has a potential and its coefficients stand still,
-as a certificate assumes; moving J*, Λ and references put it there.
+∫τ_nowᵀdθ + V_3 - V_3(0), is zero where the law has a potential and its coefficients stand still,
+as a certificate assumes; moving J*, Λ and references put it there. τ_osc is held between two
+takings, so that its work is exact; that of τ_now is the trapezoid in θ over the ticks, exact for a
+potential that is quadratic in θ, and otherwise known to the bound that is stated beside it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,7 +39,7 @@ class Passivity:
         first_violation: First logged instant at which it did, s; None if never.
         joint: Joint that had delivered most energy at that instant; None if never.
         tolerance: What rounding and integration may spend, J: twice the largest residual, and the
-            error of what is integrated from the log.
+            error of the undelayed command's work.
     """
 
     slack: Array
@@ -56,7 +58,7 @@ class Audit:
         stores: Kinetic, gravity, spring and motor energy by name, each (N,).
         joint_flows: Works per joint by name, each (N, n): port ∫τ_sea q̇, shaft ∫τ_sea θ̇,
             motor_work ∫τ_m θ̇, command ∫τ_osc θ̇, damping ∫D_θ θ̇², viscous and coulomb friction,
-            spring_damping.
+            spring_damping, and joint_damping of the bearings on the links' side.
         scalar_flows: Works done on the robot by name, each (N,): holding (contact
             stabilisation), sliding, torsion, disturbance; and impact, which is lost.
         inertia_shaping: Work of the embedded torque feedback, limits and bandwidth (N,):
@@ -68,10 +70,12 @@ class Audit:
         tank: The energy tank's part of it (N,); None without a tank.
         delay_storage: V_4 (N,) with the multiplier of the design's certificate; None if nothing
             certifies the run's design.
+        delay_storage_error: Bound of its error (N,), J; None like it.
         delay_injection: ∫(τ_osc − τ_now)ᵀθ̇ (N,): the energy that delay, sampling and losses have
             put into the robot; None if the controller does not state its undelayed command.
         law_injection: ∫τ_nowᵀθ̇ + V_3 − V_3(0) (N,): what the undelayed law has given besides its
             potential; None like ``delay_injection``.
+        injection_error: Bound of the error of both (N,), J; None like them.
         joint_side: Passivity of springs, motors, links and contacts (S_j).
         controller_side: Passivity of controller and delay (S_c); None if the controller states
             no storage function.
@@ -89,8 +93,10 @@ class Audit:
     controller_storage: Array | None
     tank: Array | None
     delay_storage: Array | None
+    delay_storage_error: Array | None
     delay_injection: Array | None
     law_injection: Array | None
+    injection_error: Array | None
     joint_side: Passivity
     controller_side: Passivity | None
     delay_side: Passivity | None
@@ -116,12 +122,53 @@ class Stated:
     Attributes:
         storage: V_3 and the tank's energy (N,), J.
         tank: The tank's energy (N,), J; None without a tank.
-        command: The undelayed command τ_now (N, n), Nm.
+        work: ∫τ_now dθ of the undelayed command per joint (N, n), J.
+        rough: Bound of the error of its sum (N,), J.
     """
 
     storage: Array
     tank: Array | None
-    command: Array
+    work: Array
+    rough: Array
+
+
+@dataclass(slots=True)
+class UndelayedWork:
+    """∫τ_now dθ of a command that is known at instants: the trapezoid in θ.
+
+    Attributes:
+        n: Number of joints.
+        command: τ_now of the present instant (n,), Nm; written by the controller.
+        work: ∫τ_now dθ per joint (n,), J.
+        rough: Bound of the error of its sum, J: half of what the trapezoids over every two
+            neighbouring intervals differ from those over one, three times their error where the
+            motion is smooth.
+    """
+
+    n: int
+    command: Array = field(init=False)
+    work: Array = field(init=False)
+    rough: float = field(init=False, default=0.0)
+    _last: list[tuple[Array, Array, float]] = field(init=False, default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.command, self.work = np.zeros(self.n), np.zeros(self.n)
+
+    def move(self, theta: Array) -> None:
+        """Take the motor angles (n,) at which ``command`` holds."""
+        here, done = (theta.copy(), self.command.copy()), 0.0
+        if self._last:
+            gained = _trapezoid(self._last[-1], here)
+            self.work += gained
+            done = float(gained.sum())
+        if len(self._last) == 2:
+            both = float(_trapezoid(self._last[0], here).sum())
+            self.rough += 0.5 * abs(both - self._last[1][2] - done)
+        self._last = [*self._last[-1:], (*here, done)]
+
+
+def _trapezoid(start: tuple[Array, ...], end: tuple[Array, ...]) -> Array:
+    return 0.5 * (start[1] + end[1]) * (end[0] - start[0])
 
 
 def audit(
@@ -143,7 +190,7 @@ def audit(
         time: Instants (N,), s.
         joints: Joint names.
         stores: Energies (N, 4), J.
-        joint: Works per joint (N, 8, n), J.
+        joint: Works per joint (N, 9, n), J.
         scalar: Other works (N, 5), J.
         throughput: Energy moved (N,), J.
         theta_dot: Motor speeds (N, n), rad/s.
@@ -160,11 +207,11 @@ def audit(
     joint_slack = drive.sum(axis=1) + scalar[:, 3] - (s_j - s_j[:1])
     control = delay = injection = own = None
     if stated is not None:
-        present, rough = _work(time, stated.command * theta_dot)
-        late = flows["command"] - present
+        late = flows["command"] - stated.work
         injection = late.sum(axis=1)
-        own = present.sum(axis=1) + stated.storage - stated.storage[:1]
+        own = stated.work.sum(axis=1) + stated.storage - stated.storage[:1]
         damped = flows["damping"].sum(axis=1)
+        rough = float(stated.rough[-1]) if time.size else 0.0
         control = _observe(time, damped - injection - own, drive, joints, tolerance)
         delay = _observe(
             time, damped - injection, late - flows["damping"], joints, tolerance + rough
@@ -180,27 +227,14 @@ def audit(
         controller_storage=None if stated is None else stated.storage,
         tank=None if stated is None else stated.tank,
         delay_storage=None,
+        delay_storage_error=None,
         delay_injection=injection,
         law_injection=own,
+        injection_error=None if stated is None else stated.rough,
         joint_side=_observe(time, joint_slack, -drive, joints, tolerance),
         controller_side=control,
         delay_side=delay,
     )
-
-
-def _work(time: Array, power: Array) -> tuple[Array, float]:
-    """Integrate logged powers (N, n) by Simpson's rule; a bound of its error from the trapezoid's.
-
-    Returns:
-        Works since the first instant (N, n), and the bound of the error of their sum, J.
-    """
-    from scipy.integrate import cumulative_simpson, cumulative_trapezoid
-
-    if len(time) < 3:
-        return np.zeros_like(power), 0.0
-    fine = cumulative_simpson(power, x=time, axis=0, initial=0.0)
-    coarse = cumulative_trapezoid(power, x=time, axis=0, initial=0.0)
-    return fine, float(np.abs((fine - coarse).sum(axis=1)).max())
 
 
 def _observe(

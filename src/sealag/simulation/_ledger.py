@@ -15,6 +15,7 @@ JOINT_FLOWS = (
     "viscous",
     "coulomb",
     "spring_damping",
+    "joint_damping",  # of the bearings, on the links' side
 )
 SCALAR_FLOWS = ("holding", "sliding", "torsion", "disturbance", "impact")
 
@@ -23,8 +24,8 @@ class Ledger:
     """Cumulative works since the beginning of a run, J.
 
     Attributes:
-        data: All of it in one row: joint, scalar, stores, throughput (8 n + 10,).
-        joint: Rows as in JOINT_FLOWS (8, n).
+        data: All of it in one row: joint, scalar, stores, throughput (9 n + 10,).
+        joint: Rows as in JOINT_FLOWS (9, n).
         scalar: As in SCALAR_FLOWS (5,); the first four are works done on the robot, impact is lost.
         stores: Energies at the present instant as in STORES (4,).
         throughput: Sum of the absolute changes of the stores, J.
@@ -52,7 +53,7 @@ class Ledger:
         self._stores(self._parameters, at.z, at.q, at.power, self.stores)
 
     def add(self, work: Array, powers: Array, step: float, at: Instant) -> None:
-        """Book one step: joint works (n, 7), stage powers (4, 6), and the stores after it."""
+        """Book one step: joint works (n, 8), stage powers (4, 6), and the stores after it."""
         self._tally(
             self._parameters, work, powers, step, at.z, at.q, at.power,
             self.joint, self.scalar, self.stores, self._moved,
@@ -74,7 +75,7 @@ def ledger_sizes(n: int) -> tuple[int, int, int, int]:
 def residual(stores: Array, joint: Array, scalar: Array) -> Array:
     """Return energy present less energy expected from all works (N,), J, of logged books.
 
-    Zero but for the integrator: stores (N, 4), joint works (N, 8, n) and other works (N, 5) come
+    Zero but for the integrator: stores (N, 4), joint works (N, 9, n) and other works (N, 5) come
     from separate integrals.
     """
     present = stores.sum(axis=1) - stores[:1].sum()

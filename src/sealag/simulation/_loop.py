@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from sealag.actuation import Actuators
-from sealag.delay import DelayLine
 from sealag.errors import InputError, SealagError, SolverError
 from sealag.robot import Robot
-from sealag.simulation._audit import Stated, audit
+from sealag.simulation._audit import Stated, UndelayedWork, audit
+from sealag.simulation._exchange import SAME, Exchanges
 from sealag.simulation._ledger import JOINT_FLOWS, ledger_sizes
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
@@ -28,9 +28,10 @@ from sealag.whole_body import (
 _WATCH = 5e-3  # s between two looks for a fall
 _AT_REST = 1e-12  # rad: how far the first motor angles may be from rest
 _ROUNDS = 50
-_SCALARS = ("time", "measurement_age", "command_age", "storage", "tank")
+_SCALARS = ("time", "measurement_age", "command_age", "storage", "tank", "rough")
 _LONGEST = 100.0  # rad: a spring deflection beyond any physical range
-_BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError)  # numbers that have no answer
+_BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError)  # arithmetic that has no answer
+_MAY_BE_NUMERICAL = (Outcome.DIVERGED, Outcome.CONTACT_UNSOLVABLE, Outcome.CHATTERED)
 
 
 def closed_loop(
@@ -122,37 +123,18 @@ class _Loop:
             stabilisation=scene.stabilisation,
         )
         n, feet = robot.n, len(scene.feet)
-        self._central_steps = clock.steps_of("central", clock.central)
-        self._embedded_steps = clock.steps_of("embedded", clock.embedded)
         self._watch_steps = max(1, round(_WATCH / clock.physics))
         allocate = {"nq": robot.nq, "nv": robot.nv, "n": n, "contacts": feet}
-        self.truth = Measurement.allocate(**allocate)
-        self.received = Measurement.allocate(**allocate)
-        self.command, self._passing, self.acting = (np.zeros(n + 1) for _ in range(3))
-        self._torque_held = np.zeros(n)
-        self._open_lines(network, n)
+        self.truth, self.received = (Measurement.allocate(**allocate) for _ in range(2))
+        self._sampled: dict[int, Array] = {}
+        self._commands: dict[int, Array] = {}
+        self._known, self._sent, self._acting = 0.0, 0.0, 0.0
+        self.acting, self._torque_held = np.zeros(n), np.zeros(n)
         self._storing = controller if isinstance(controller, StoringController) else None
         self._tank = controller if isinstance(controller, TankController) else None
-        self._present = np.zeros(n)
-        self._pushes = [(frames.index(push.frame), push) for push in scene.pushes]
+        self._given, self._said = UndelayedWork(n), (-1.0, 0.0)
+        self._frames = frames
         self._fall_height, self._upright = -np.inf, (0.0, 0.0, 1.0)
-
-    def _open_lines(self, network: Network, n: int) -> None:
-        clock = self.clock
-        streams = [np.random.default_rng(s) for s in np.random.SeedSequence(self.seed).spawn(4)]
-
-        def line(link, width, period, receive_period, rng):
-            return DelayLine(
-                link, width=width, period=period, receive_period=receive_period, rng=rng
-            )
-
-        central, embedded = clock.central, clock.embedded
-        self._up = line(network.central_up, self.truth.data.size, embedded, central, streams[0])
-        self._down = line(network.central_down, n + 1, central, embedded, streams[1])
-        self._drive = line(network.embedded_down, n + 1, embedded, embedded, streams[2])
-        self._torque = None
-        if network.embedded_up is not None:
-            self._torque = line(network.embedded_up, n, embedded, embedded, streams[3])
 
     # Start -------------------------------------------------------------------------------------
     def prepare(self, q: Array, v: Array, theta: Array | None, theta_dot: Array | None) -> None:
@@ -179,13 +161,8 @@ class _Loop:
             answer(np.asarray(theta, dtype=float))
         self.plant.sense(0.0, truth.data)
         self._ask(self.controller.reset, 0.0, truth)
-        self._up.fill(truth.data)
-        self.command[1:] = first
-        self._down.fill(self.command)
-        self._drive.fill(self.command)
-        self._torque_held[:] = self.plant.tau_sea
-        if self._torque is not None:
-            self._torque.fill(self._torque_held)
+        self.command = first
+        self.acting[:] = first
         self._fall_reference()
 
     def _rest(self, answer: Callable[[Array], Array], guess: Array) -> Array:
@@ -231,32 +208,81 @@ class _Loop:
             )
         every = self.clock.steps_of("log", log_period)
         log = self._allocate(steps // every + 2)
+        self._plan(steps * self.clock.physics)
         outcome, message = Outcome.COMPLETED, ""
         shown = max(1, round(0.1 / self.clock.physics))
         try:
             for i in range(steps):
-                self._control(i)
+                self._begin(i)
                 if i % every == 0:
                     self._record(log)
-                self._push(i)
-                self.plant.step(self.acting[1:], self._torque_held)
+                self._move(i)
                 if progress is not None and i % shown == 0:
                     progress(self.plant.time)
-            self.plant.sense(self.plant.time, self.truth.data)
+            self._begin(steps)
             self._record(log)
         except PlantStop as stop:
             outcome, message = stop.outcome, stop.message
+            if outcome in _MAY_BE_NUMERICAL:
+                self.plant.refuse_long_step()
         except SealagError as error:
             outcome = Outcome.CONTROLLER_FAILED
             message = f"at t = {self.plant.time:.4f} s: {error}"
         except _BREAKDOWN as error:
             outcome = Outcome.DIVERGED
-            message = f"the motion has no numbers after t = {self.plant.time:.4f} s: {error}"
+            message = f"the motion cannot be computed after t = {self.plant.time:.4f} s: {error}"
         except KeyboardInterrupt:
             outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
         if not log.filled:
             self._record(log)
         return self._result(log, outcome, message)
+
+    def _plan(self, duration: float) -> None:
+        """Lay out all that happens between the steps: loads, samples, ticks and takings."""
+        ways = Exchanges.plan(self._network, self.clock, duration=duration, seed=self.seed)
+        self.exchanges = ways
+        edges = [t for push in self.scene.pushes for t in (push.start, push.start + push.duration)]
+        times = (np.unique(edges), ways.seen, ways.tick, ways.taken)
+        kinds = np.repeat(np.arange(4), [len(t) for t in times])
+        time = np.concatenate(times)
+        order = np.lexsort((kinds, time))
+        number = np.concatenate([np.arange(len(t)) for t in times])
+        self._due, self._kind, self._number = time[order], kinds[order], number[order]
+        self._next = 0
+        self._happen_by = (self._load, self._sample, self._tick, self._take)
+        # How many ticks a command may lie before the drives take it.
+        issued = np.searchsorted(ways.tick, ways.taken, "right")
+        self._depth = int((issued - ways.command).max(initial=0)) + 1
+        if ways.torque is not None:
+            period = self.clock.embedded or self.clock.physics
+            self._torque_steps = self.clock.steps_of("embedded", period)
+            late = int(np.ceil((period * np.arange(len(ways.torque)) - ways.torque).max() / period))
+            self._history = np.tile(self.plant.tau_sea, (late + 2, 1))
+
+    def _begin(self, i: int) -> None:
+        """Let happen what is due at the beginning of physics step i."""
+        if i % self._watch_steps == 0:
+            self._watch()
+        self._happen(i * self.clock.physics)
+        if self.exchanges.torque is not None and i % self._torque_steps == 0:
+            self._feed_torque(i // self._torque_steps)
+
+    def _move(self, i: int) -> None:
+        """Move the plant over physics step i, stopping wherever something is due inside it."""
+        end = (i + 1) * self.clock.physics
+        last = end - SAME * self.clock.physics
+        while self._next < len(self._due) and self._due[self._next] < last:
+            instant = float(self._due[self._next])
+            self.plant.advance(instant, self.acting, self._torque_held)
+            self._happen(instant)
+        self.plant.advance(end, self.acting, self._torque_held)
+
+    def _happen(self, instant: float) -> None:
+        last = instant + SAME * self.clock.physics
+        while self._next < len(self._due) and self._due[self._next] <= last:
+            kind, number = self._kind[self._next], int(self._number[self._next])
+            self._next += 1
+            self._happen_by[kind](number)
 
     @staticmethod
     def _ask(question: Callable[..., Any], *arguments: Any) -> Any:
@@ -268,30 +294,60 @@ class _Loop:
         except _BREAKDOWN as error:
             raise SolverError(f"the controller cannot be evaluated: {error}") from error
 
-    def _control(self, i: int) -> None:
-        """Exchange what is due at physics step i."""
-        t = i * self.clock.physics
-        if i % self._watch_steps == 0:
-            self._watch()
-        if i % self._embedded_steps == 0:
-            self.plant.sense(t, self.truth.data)
-            self._up.send(t, self.truth.data)
-        if i % self._central_steps == 0:
-            self._up.receive(t, self.received.data)
-            self._ask(self.controller.tick, t, self.received, self.command[1:])
-            self.command[0] = t
-            if not math.isfinite(sum(self.command.tolist())):
-                raise PlantStop(
-                    Outcome.CONTROLLER_FAILED, f"the command at t = {t:.4f} s is not finite"
-                )
-            self._down.send(t, self.command)
-        if i % self._embedded_steps == 0:
-            self._down.receive(t, self._passing)
-            self._drive.send(t, self._passing)
-            self._drive.receive(t, self.acting)
-            if self._torque is not None:
-                self._torque.send(t, self.plant.tau_sea)
-                self._torque.receive(t, self._torque_held)
+    def _load(self, _: int) -> None:
+        """Let the pushes act that act from now on."""
+        now = self.plant.time + SAME * self.clock.physics
+        load = np.zeros((len(self._frames), 3))
+        for push in self.scene.pushes:
+            if push.start <= now < push.start + push.duration:
+                load[self._frames.index(push.frame)] += push.force
+        self.plant.push(load)
+
+    def _sample(self, tick: int) -> None:
+        """Measure what the controller will know at a tick."""
+        self.plant.sense(float(self.exchanges.seen[tick]), self.truth.data)
+        self._sampled[tick] = self.truth.data.copy()
+
+    def _tick(self, tick: int) -> None:
+        t = float(self.exchanges.tick[tick])
+        self.received.data[:] = self._sampled.pop(tick)
+        self.command = np.zeros(self.robot.n)
+        self._ask(self.controller.tick, t, self.received, self.command)
+        if not np.isfinite(self.command).all():
+            raise PlantStop(
+                Outcome.CONTROLLER_FAILED, f"the command at t = {t:.4f} s is not finite"
+            )
+        self._known, self._sent = self.received.data[0], t
+        self._commands[tick] = self.command
+        self._commands.pop(tick - self._depth, None)
+        self._state_work(self.plant.time)
+
+    def _take(self, taking: int) -> None:
+        """Let the drives obey another command."""
+        tick = int(self.exchanges.command[taking])
+        self.acting[:] = self._commands[tick]
+        self._acting = float(self.exchanges.tick[tick])
+
+    def _feed_torque(self, look: int) -> None:
+        """Give the drives the spring torque that reaches their torque feedback now."""
+        assert self.exchanges.torque is not None
+        period, size = self.clock.embedded or self.clock.physics, len(self._history)
+        self._history[look % size] = self.plant.tau_sea
+        place = float(self.exchanges.torque[look]) / period
+        before = int(place + 1e-9)
+        part, after = max(0.0, place - before), min(before + 1, look)
+        earlier, later = self._history[before % size], self._history[after % size]
+        self._torque_held[:] = earlier + part * (later - earlier)
+
+    def _state_work(self, t: float) -> float:
+        """Let the controller state its undelayed command and its potential; return the latter."""
+        if self._storing is None or t == self._said[0]:
+            return self._said[1]
+        self.plant.sense(t, self.truth.data)
+        storage = self._ask(self._storing.storage, t, self.truth, self._given.command)
+        self._given.move(self.plant.theta)
+        self._said = t, storage
+        return storage
 
     def _watch(self) -> None:
         """End the run when the robot has fallen or left any physical range."""
@@ -315,34 +371,22 @@ class _Loop:
                     f"t = {plant.time:.3f} s",
                 )
 
-    def _push(self, i: int) -> None:
-        if not self._pushes:
-            return
-        load = self.plant.load
-        load[:] = 0.0
-        step = self.clock.physics
-        for frame, push in self._pushes:
-            if round(push.start / step) <= i < round((push.start + push.duration) / step):
-                load[frame] += push.force
-
     # Storage -----------------------------------------------------------------------------------
     def _allocate(self, rows: int) -> Log:
         n, plant = self.robot.n, self.plant
         widths = {"scalars": len(_SCALARS), "instant": plant.instant.row.size}
-        widths |= {"tau_command": n, "tau_osc": n, "present": n}
+        widths |= {"tau_command": n, "tau_osc": n, "given": n}
         widths |= dict.fromkeys(("closed", "yielding"), plant.contacts.count)
         return Log(rows, widths | {"ledger": plant.ledger.data.size})
 
     def _record(self, log: Log) -> None:
-        plant, t, storage = self.plant, self.plant.time, 0.0
-        if self._storing is not None:
-            self.plant.sense(t, self.truth.data)
-            storage = self._ask(self._storing.storage, t, self.truth, self._present)
-        received, sent, acting = self.received.data[0], self.command[0], self.acting[0]
+        plant, t = self.plant, self.plant.time
+        storage = self._state_work(t)
         tank = 0.0 if self._tank is None else self._tank.tank_energy
         log.row(
-            (t, sent - received, t - acting, storage, tank), plant.instant.row, self.command[1:],
-            self.acting[1:], self._present, *plant.contacts.state, plant.ledger.data,
+            (t, self._sent - self._known, t - self._acting, storage, tank, self._given.rough),
+            plant.instant.row, self.command, self.acting, self._given.work,
+            *plant.contacts.state, plant.ledger.data,
         )  # fmt: skip
 
     def _result(self, log: Log, outcome: Outcome, message: str) -> Run:
@@ -368,6 +412,7 @@ class _Loop:
             tau_osc=log.column("tau_osc", n),
             measurement_age=scalars["measurement_age"],
             command_age=scalars["command_age"],
+            ages=self.exchanges.ages(self.plant.time),
             contact_mode=(closed * (1 + sliding)).astype(np.int64),
             events=tuple(self.plant.events),
             audit=audit(
@@ -392,7 +437,8 @@ class _Loop:
         return Stated(
             storage=scalars["storage"],
             tank=tank if tank.any() else None,
-            command=log.column("present", self.robot.n),
+            work=log.column("given", self.robot.n),
+            rough=scalars["rough"],
         )
 
 

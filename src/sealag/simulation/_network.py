@@ -70,7 +70,7 @@ class Clock:
     Attributes:
         physics: Step of the plant, s.
         embedded: Period at which measurements are sent and the drives look for commands, s;
-            default the physics step.
+            0 for at once, whatever the physics step.
         central: Period of the central controller, s.
 
     Raises:
@@ -82,15 +82,12 @@ class Clock:
     central: float = 1e-3
 
     def __post_init__(self) -> None:
-        if self.embedded == 0.0:
-            object.__setattr__(self, "embedded", self.physics)
         for name in ("physics", "embedded", "central"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
+            if not (math.isfinite(value) and (value > 0 or name == "embedded" and value == 0)):
                 raise InputError(f"the {name} period must be a time > 0 s, got {value}")
-        self.steps_of("embedded", self.embedded)
-        self.steps_of("central", self.central)
-        if self.steps_of("central", self.central) % self.steps_of("embedded", self.embedded):
+        central = self.steps_of("central", self.central)
+        if self.embedded and central % self.steps_of("embedded", self.embedded):
             raise InputError(
                 f"the central period {self.central:g} s must be a whole multiple of the embedded "
                 f"period {self.embedded:g} s"

@@ -27,6 +27,7 @@ FASTEST = 1e4  # rad/s, m/s: beyond any physical range
 _EVENTS_PER_STEP = 60
 _STABLE = 2.0  # swing of a link on its spring in a step, rad; Runge-Kutta is stable to 2.8
 _LOCATE = 40
+_SAME = 1e-9  # of a step: lengths this close are one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +97,7 @@ class Plant:
         n, nv, self._sizes = robot.n, robot.nv, self.contacts.sizes
         self.time = 0.0
         self._terms = dynamics.allocate(robot.tree[0])
-        self._parameters = motor_parameters(actuators)
+        self._parameters = motor_parameters(actuators, robot.damping)
         self._instant = 0.0 if delayed_torque_feedback else 1.0
         self._tables = (
             np.empty((n, 4, 9, 9)),
@@ -108,7 +109,6 @@ class Plant:
         self._memory = np.zeros(plant.memory_size(nv, n))
         parts = plant.shared(self._memory, nv, n)
         self._powers, self._work = parts[2], parts[5]
-        self.load = self.contacts.load
         self.ledger = Ledger(self._parameters)
         self.impulse = np.zeros((self.contacts.count, 3))
         self.events: list[ContactEvent] = []
@@ -138,7 +138,7 @@ class Plant:
         self.events.clear()
         self.contacts.open_all()
         self._evaluate(now)
-        self._refuse_stiffness(self._terms[0])
+        self.refuse_long_step()
         self.contacts.refuse_buried(now)
         self.contacts.measure_gaps(now)
         try:
@@ -147,19 +147,19 @@ class Plant:
             raise InputError(f"the run cannot begin: {stop.message}") from None
         self.ledger.begin(now)
 
-    def _refuse_stiffness(self, M: Array) -> None:
-        n = self.robot.n
-        root = np.sqrt(self._parameters[:, 0])
-        mobility = np.linalg.inv(M)[-n:, -n:]
-        squares, modes = np.linalg.eigh(root[:, None] * mobility * root)
-        fastest = float(np.sqrt(squares[-1]))
-        if fastest * self.step_length > _STABLE:
-            joint = self.robot.joints[int(np.abs(modes[:, -1]).argmax())]
+    def refuse_long_step(self) -> None:
+        """Refuse a step that is too long for the springs and dampers where the robot is now.
+
+        Raises:
+            InputError: The fastest link on its spring moves too far in a step.
+        """
+        rate, joint = fastest_link(self.robot, self.actuators, self.q)
+        if rate * self.step_length > _STABLE:
             raise InputError(
                 f"the physics step of {self.step_length * 1e3:g} ms is too long: the link of "
-                f"{joint} swings on its spring at {fastest:.0f} rad/s; use at most "
-                f"{0.5e3 * _STABLE / fastest:.1g} ms (simulation.physics_step_ms), "
-                "or is the spring too stiff for the link's inertia?"
+                f"{joint} follows its spring and damper at {rate:.0f} 1/s; use at most "
+                f"{0.5e3 * _STABLE / rate:.1g} ms (simulation.physics_step_ms), or are they too "
+                "stiff for the link's inertia?"
             )
 
     @property
@@ -214,10 +214,20 @@ class Plant:
         )
 
     # Motion ------------------------------------------------------------------------------------
-    def step(self, tau_osc: Array, tau_measured: Array | None = None) -> None:
-        """Move by one step under a held command.
+    def push(self, load: Array) -> None:
+        """Let other forces act on the loaded frames from now on.
 
         Args:
+            load: Forces in the world frame (L, 3), N.
+        """
+        self.contacts.load[:] = load
+        self._evaluate(self._now)
+
+    def advance(self, instant: float, tau_osc: Array, tau_measured: Array | None = None) -> None:
+        """Move to an instant, at most a step ahead, under a held command.
+
+        Args:
+            instant: Where to stop, s.
             tau_osc: Command as it reached the motors (n,), Nm.
             tau_measured: Spring torque as it reached the embedded controller (n,), Nm; used only
                 with ``delayed_torque_feedback``.
@@ -226,26 +236,31 @@ class Plant:
             PlantStop: The step cannot be completed; the state is that of the last good instant.
         """
         measured = self._now.tau if tau_measured is None else tau_measured
-        left, regular = self.step_length, True
+        left = instant - self.time
+        regular = abs(left - self.step_length) <= _SAME * self.step_length
+        if regular:
+            left = self.step_length
         for _ in range(_EVENTS_PER_STEP):
             self.contacts.remember()
             self._try(left, regular, tau_osc, measured)
             margin, point = self.contacts.margin(self._next)
             if margin >= -MARGIN:
                 self._accept(left, regular, tau_osc, measured)
-                return
+                break
             done, point = self._locate(left, margin, point, tau_osc, measured)
             regular = False
             self._accept(done, regular, tau_osc, measured)
             self._change(point)
             left -= done
-            if left <= 1e-9 * self.step_length:
-                return
-        raise PlantStop(
-            Outcome.CHATTERED,
-            f"contacts changed more than {_EVENTS_PER_STEP} times in one step at t = "
-            f"{self.time:.4f} s",
-        )
+            if left <= _SAME * self.step_length:
+                break
+        else:
+            raise PlantStop(
+                Outcome.CHATTERED,
+                f"contacts changed more than {_EVENTS_PER_STEP} times in one step at t = "
+                f"{self.time:.4f} s",
+            )
+        self.time = instant
 
     def _try(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
         """Fill the next instant with the state one step ahead in the present contact modes."""
@@ -373,3 +388,27 @@ class Plant:
                     impulse=(x, y, z),
                 )
             )
+
+
+def fastest_link(robot: Robot, actuators: Actuators, q: Array) -> tuple[float, str]:
+    """Return how fast the fastest link follows its spring and dampers, and its joint.
+
+    The largest |λ| of M v̇ = -K δ - (D_s + joint damping) v with locked motors and feet in the air,
+    1/s: what decides how long a step may be.
+
+    Args:
+        robot: The robot.
+        actuators: Its springs and motors.
+        q: Configuration (nq,).
+    """
+    n = robot.n
+    mobility = np.linalg.inv(robot.mass_matrix(q))[-n:, -n:]
+    damping = actuators.spring_damping + robot.damping
+    root = np.sqrt(actuators.spring_stiffness)
+    O = np.zeros((n, n))
+    # State (√K δ, v): without damping the matrix is as well scaled as its eigenvalues.
+    A = np.block([[O, np.diag(root)], [-mobility * root, -mobility * damping]])
+    values, modes = np.linalg.eig(A)
+    fastest = int(np.abs(values).argmax())
+    moved = np.abs(modes[n:, fastest])
+    return float(np.abs(values[fastest])), robot.joints[int(moved.argmax())]

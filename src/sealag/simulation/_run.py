@@ -6,6 +6,7 @@ import numpy as np
 
 from sealag.errors import InputError
 from sealag.simulation._audit import Audit
+from sealag.simulation._exchange import Ages
 from sealag.simulation._outcome import Outcome
 from sealag.simulation._plant import ContactEvent
 from sealag.typing import Array, IntArray
@@ -34,6 +35,7 @@ class Run:
         tau_osc: Command as it acts at the motors, delayed (N, n), Nm.
         measurement_age: Age of the measurement behind ``tau_command`` (N,), s.
         command_age: Age of the command in ``tau_osc`` (N,), s.
+        ages: The largest of these ages between the logged instants too.
         contact_mode: 0 open, 1 sticking, 2 slipping (N, P).
         contact_force: Forces in the contact frames, normal last (N, P, 3), N.
         events: Touchdowns and lift-offs in order.
@@ -56,6 +58,7 @@ class Run:
     tau_osc: Array
     measurement_age: Array
     command_age: Array
+    ages: Ages
     contact_mode: IntArray
     contact_force: Array
     events: tuple[ContactEvent, ...]

@@ -15,8 +15,8 @@ class Push:
     Attributes:
         frame: Where it acts.
         force: Force in the world frame (3,), N.
-        start: When it begins, s; it begins and ends at the nearest physics steps.
-        duration: How long it lasts, s.
+        start: When it begins, s.
+        duration: How long it lasts, s; steps are split where it begins and ends.
 
     Raises:
         InputError: The force is not three finite numbers, or the times are negative.

@@ -137,13 +137,12 @@ def freeze(
     command = law.signal.start(evaluation, delay_bound=0.0).derivative(rest.q, rest.theta)
     links = LinkPlant(robot, contacts).free(rest.q, rest.tau_sea)
     links, kept, C_z, B_z = _without_momentum(links, command)
-    damping = getattr(robot, "damping", np.zeros(robot.n))
     return sea_loop(
         actuators,
         M=links.M,
         H=links.H,
         S=links.Z[robot.nv_base :],
-        joint_damping=damping,
+        joint_damping=robot.damping,
         C_z=C_z,
         C_theta=command.C_theta,
         memory=Memory(
