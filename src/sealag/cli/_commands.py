@@ -13,7 +13,7 @@ from sealag.errors import FileError, InputError
 from sealag.files import check_output, make_folder, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
-from sealag.units import time_text
+from sealag.units import seconds_from_ms, time_text
 
 LONGEST_HORIZON_MS = 1e6
 LARGEST_LIST = 250
@@ -140,7 +140,7 @@ def margin_project(
             f"{LONGEST_HORIZON_MS:g}."
         )
     system = load(project)
-    horizon = None if horizon_ms is None else seconds_fromtime_text(horizon_ms)
+    horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
     with _busy("computing margins"):
         found = local_margins(system, _motion(system, motion), horizon=horizon)
     answer: dict[str, Any] = found.summary()

@@ -103,6 +103,7 @@ class LawEvaluation:
         self._motion, self._along = np.zeros(nv), np.zeros((nv, n))
         self.planned_gravity, self._unused = np.zeros(n), np.zeros(n)
         self._step, self._square, self._joints = np.zeros(n), np.zeros((n, n)), np.zeros(n)
+        self._slope, self._slopes = np.zeros((n, n)), (np.zeros((nv, nv)), np.zeros((nv, n)))
 
     @property
     def rows(self) -> int:
@@ -188,8 +189,12 @@ class LawEvaluation:
         K, space, step = self.spring_stiffness, self.space, self._step
         for _ in range(iterations):
             self.at(q, theta + sag, out)
+            if self.gravity_is_fed_back:
+                self._kernel.gravity_slope(
+                    self.robot.tree, self._terms, space.joint_from_base, *self._slopes, self._slope
+                )
             exists = self._kernel.static_step(
-                space.J_star, space.stiffness, K, out, sag, self._square, step
+                space.J_star, space.stiffness, self._slope, K, out, sag, self._square, step
             )
             size = float(np.abs(step).max())
             if not (exists and size < DIVERGED):
