@@ -1,4 +1,4 @@
-"""A robot with mimic joints of every kind, written as URDF."""
+"""Robots with mimic joints, written as URDF: one of every kind, and random ones."""
 
 _LINK = (
     '<link name="{name}"><inertial><origin xyz="{com}"/><mass value="{mass}"/>'
@@ -10,14 +10,16 @@ _JOINT = (
     '<limit lower="{lower}" upper="{upper}" effort="9" velocity="8"/>{more}</joint>'
 )
 
+_FREE = {"lower": -1e9, "upper": 1e9}
+
 
 def link(name, *, com="0 0.1 0.1", mass=1.0):
     """Return a link."""
     return _LINK.format(name=name, com=com, mass=mass)
 
 
-def joint(name, parent, child, *, kind="revolute", xyz="0.1 0 0.2", axis="0 1 0.5", lower=-3,
-          upper=3, mimic=None, dynamics=None):  # fmt: skip
+def joint(name, parent, child, *, kind="revolute", xyz="0.1 0 0.2", axis="0 1 0.5", lower=-3.0,
+          upper=3.0, mimic=None, dynamics=None):  # fmt: skip
     """Return a joint; mimic is (joint, multiplier, offset), dynamics (damping, friction)."""
     more = ""
     if mimic is not None:
@@ -48,3 +50,27 @@ MIMICS = robot(
     joint("beside", "hand", "right", axis="1 0 0", mimic=("own", -2.0, 0.0), dynamics=(0.5, 0.3)),
 )
 """A slide that follows a joint behind it, a joint that follows the slide, one beside its leader."""
+
+
+def random_mimics(rng):
+    """Return the URDF of a random tree, and (leader, multiplier, offset) of each of its mimics.
+
+    Leaders lie anywhere in the tree; chains of mimics are resolved.
+    """
+    count = int(rng.integers(2, 9))
+    order, mimics, resolved = rng.permutation(count), {}, {}
+    for place, k in enumerate(order[1:], start=1):
+        if rng.random() < 0.5:
+            of = f"j{order[rng.integers(place)]}"
+            multiplier, offset = (round(float(x), 3) for x in rng.normal(size=2) * (1.0, 0.2))
+            mimics[f"j{k}"] = of, multiplier, offset
+            leader, m, o = resolved.get(of, (of, 1.0, 0.0))
+            resolved[f"j{k}"] = leader, multiplier * m, multiplier * o + offset
+    parts = [link("b0", mass=2)]
+    for k in range(count):
+        com, xyz, axis = (" ".join(map(str, x)) for x in rng.normal(size=(3, 3)).round(2) * 0.3)
+        parts.append(link(f"b{k + 1}", com=com, mass=round(float(rng.uniform(0.3, 2.0)), 2)))
+        kind = "revolute" if rng.random() < 0.6 else "prismatic"
+        parts.append(joint(f"j{k}", f"b{rng.integers(k + 1)}", f"b{k + 1}", kind=kind, xyz=xyz,
+                           axis=axis, **_FREE, mimic=mimics.get(f"j{k}")))  # fmt: skip
+    return robot(*parts), resolved

@@ -176,7 +176,7 @@ def test_effort_and_velocity_limits_are_what_the_file_says(tmp_path):
     np.testing.assert_array_equal(limited.velocity_limit, [0.0, 8.0])
     free = robot(*ARM).replace(
         'type="revolute"', 'type="continuous"', 1
-    ).replace('<limit lower="-3" upper="3" effort="9" velocity="8"/>', "", 1)  # fmt: skip
+    ).replace('<limit lower="-3.0" upper="3.0" effort="9" velocity="8"/>', "", 1)  # fmt: skip
     np.testing.assert_array_equal(read(tmp_path, free).effort_limit, [np.inf, 9.0])
 
 

@@ -243,16 +243,7 @@ def reduce_model(
         RobotError: no joint is left, or one mimics another or has more than one degree of freedom.
     """
     movable = [name for name in model.names[1:] if name != ROOT_JOINT]
-    names = [j for j in movable if j not in followers] if actuated is None else list(actuated)
-    for name in names:
-        if name not in movable:
-            raise near(name, movable, what=f"joint of {path.name}")
-        if name in followers:
-            raise _follows(name, followers[name], path)
-    if len(set(names)) < len(names):
-        raise RobotError(f"{path}: an actuated joint is listed twice.")
-    if not names:
-        raise RobotError(f"{path}: no joint is actuated.")
+    names = _actuated(movable, path, actuated=actuated, followers=followers)
     driven = {
         name: follower
         for name, follower in followers.items()
@@ -273,6 +264,27 @@ def reduce_model(
                 "actuated joints must be revolute, continuous or prismatic."
             )
     return reduced, driven
+
+
+def _actuated(
+    movable: Sequence[str],
+    path: Path,
+    *,
+    actuated: Sequence[str] | None,
+    followers: Mapping[str, Follower],
+) -> list[str]:
+    """Names of the joints that have actuators, checked."""
+    names = [j for j in movable if j not in followers] if actuated is None else list(actuated)
+    for name in names:
+        if name not in movable:
+            raise near(name, movable, what=f"joint of {path.name}")
+        if name in followers:
+            raise _follows(name, followers[name], path)
+    if len(set(names)) < len(names):
+        raise RobotError(f"{path}: an actuated joint is listed twice.")
+    if not names:
+        raise RobotError(f"{path}: no joint is actuated.")
+    return names
 
 
 def _lock(model: Any, joints: Sequence[int], at: Array) -> Any:
