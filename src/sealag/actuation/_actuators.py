@@ -77,7 +77,7 @@ def actuators(
         spring_damping: D_s, Nms/rad.
         coulomb_friction: Nm.
         viscous_friction: Nms/rad.
-        torque_limit: Nm, positive, inf for none.
+        torque_limit: Nm, inf for none; a motor with 0 gives nothing.
         velocity_limit: rad/s, positive, inf for none.
         torque_bandwidth: rad/s, positive, inf for an ideal torque loop.
 
@@ -100,7 +100,7 @@ def actuators(
         spring_damping=take("spring_damping", spring_damping, positive=False),
         coulomb_friction=take("coulomb_friction", coulomb_friction, positive=False),
         viscous_friction=take("viscous_friction", viscous_friction, positive=False),
-        torque_limit=take("torque_limit", torque_limit, positive=True, finite=False),
+        torque_limit=take("torque_limit", torque_limit, positive=False, finite=False),
         velocity_limit=take("velocity_limit", velocity_limit, positive=True, finite=False),
         torque_bandwidth=take("torque_bandwidth", torque_bandwidth, positive=True, finite=False),
     )

@@ -172,7 +172,7 @@ def _of_contacts(system: System) -> Iterator[tuple[str, str]]:
         )
     yield (
         "simulation",
-        "What [simulation] says (scenario, duration_s, physics_step_ms, pushes with frame, force_n, "
-        "start_s and duration_s, drop_height, track_amplitude, track_frequency_hz, seed, and the "
+        "What [simulation] says (scenario, duration_s, physics_step_ms, pushes with frame, "
+        "force_n, start_s and duration_s, drop_height, track_amplitude, track_frequency_hz, seed, and the "
         "ground and feet) sets a run, not the loop.",
     )

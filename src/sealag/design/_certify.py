@@ -1,7 +1,6 @@
 """From a system and a motion to a certificate."""
 
 import sys
-from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -52,8 +51,8 @@ def certify(
 ) -> Certificate:
     """Certify how much delay a design tolerates at every instant of a motion.
 
-    A posture is certified where the loop that holds it rests; the instants of a motion as they are.
-    Stability and local margin are decided over all instants, where the loop that holds each rests.
+    Stability and local margin are decided over all instants, in the instant's configuration itself
+    and where the loop that holds it rests.
 
     Args:
         system: the design.
@@ -81,8 +80,7 @@ def certify(
     kind = _criterion(system, motion, criterion, time_varying=time_varying, proofs=proofs)
     rest = system.rest() if motion is None else None
     motion = system.still() if motion is None else motion
-    taken = motion if rest is None else replace(motion, q=rest.fed_back[None])
-    spaces = system.spaces(taken)
+    spaces = system.spaces(motion)
     published = published_bounds(spaces, system, solver=solver)
     printed = kind is Criterion.PUBLISHED
     passive = certified_bounds(spaces, system, rest)

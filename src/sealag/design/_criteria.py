@@ -102,8 +102,9 @@ def _refusals(spaces: Spaces, system: System, rest: Rest | None) -> Iterator[tup
     yield (
         spaces.singular,
         (
-            f"contacts or tasks lose a direction at {spaces.singular.sum()} of {count} instants that "
-            "they have beside it, where the stiffness jumps; certify postures away from the singularity"
+            f"contacts or tasks lose a direction at {spaces.singular.sum()} of {count} instants "
+            "that they have beside it, where the stiffness jumps; certify postures away from the "
+            "singularity"
         ),
     )
     bent = ~(spaces.asymmetry <= ASYMMETRY_TOLERANCE)

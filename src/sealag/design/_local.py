@@ -107,11 +107,13 @@ class Local:
 def local_of(system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> Local:
     """Decide stability and margin of the law that runs at every instant of a motion.
 
-    Each instant is a loop that holds the instant's configuration, frozen where it rests. Where the
-    law has a potential, it rests at the instant itself, joints determine all motions and the drives
-    are ideal, a potential with a strict minimum is stable without delay, and the passive bound lies
-    below the margin (V̇ ≤ 0 for delays up to it): such an instant is decided exactly only if its
-    bound lies below the smallest margin known. All others are decided exactly, up to MOST_EXACT.
+    Each instant is a loop that holds the instant's configuration. It is frozen in that
+    configuration and, where the law sags, where it rests with the references as they are; the
+    smaller margin counts. Where the law has a potential, rests at the instant itself, joints
+    determine all motions and the drives are ideal, a strict minimum of the potential is stable
+    without delay, and the passive bound lies below the margin (V̇ ≤ 0 for delays up to it): such an
+    instant is decided exactly only if its bound lies below the smallest margin known. All others
+    are decided exactly, up to MOST_EXACT.
 
     Args:
         system: the design.
@@ -120,6 +122,31 @@ def local_of(system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> 
         bounds: of the certified criterion.
     """
     return _Decision(system, motion, spaces, bounds).run()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Known:
+    """What is known of one frozen loop."""
+
+    margin: DelayMargin | None
+    loop: FrozenLoop | None
+    rest: Rest
+    problem: str
+
+    @property
+    def roots(self) -> int:
+        return 0 if self.margin is None else self.margin.unstable_roots
+
+    @property
+    def delay(self) -> float | None:
+        """The margin, s; 0 where nothing balances or the law has no loop; None if not decided."""
+        if not self.rest.found or self.loop is None or self.roots:
+            return 0.0
+        return None if self.margin is None else float(self.margin.delay)
+
+    def order(self) -> tuple[float, int]:
+        """Smallest margin first, of zeros the most unstable, what is not known last."""
+        return (np.inf if self.delay is None else self.delay), -self.roots
 
 
 class _Decision:
@@ -147,10 +174,9 @@ class _Decision:
                 break
             self._decide(int(k))
         assert self._best is not None
-        margin, loop, rest, problem, critical = self._best
         return Local(
-            instants=tuple(self._found), critical=critical, margin=margin, loop=loop, rest=rest,
-            problem=problem,
+            instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
+            loop=self._best.loop, rest=self._best.rest, problem=self._best.problem,
         )  # fmt: skip
 
     def _least(self) -> float:
@@ -160,41 +186,29 @@ class _Decision:
     def _decide(self, k: int) -> bool:
         """Decide an instant exactly; return whether it is unstable without delay."""
         self._exact += 1
-        rest, loop, margin, problem = self._system.rest(self._motion, k), None, None, ""
-        try:
-            loop = self._system.frozen(self._motion, k, rest=rest)
-            margin = margin_of(loop)
-        except (ContractionError, SolverError) as error:
-            problem = str(error)
-        roots = 0 if margin is None else margin.unstable_roots
-        if not rest.found:
-            problem = rest.reason
-        unstable = bool(roots) or not rest.found or loop is None
-        if margin is not None or unstable:
-            delay = 0.0 if unstable or margin is None else float(margin.delay)
-            self._found[k] = InstantMargin(basis=Basis.EXACT, delay=delay, unstable_roots=roots)
-        self._keep(k, margin, loop, rest, problem)
+        rest = self._system.rest(self._motion, k)
+        states = [rest]
+        if not (self._system.law.rests_at_posture and rest.found):
+            states.append(self._system.in_posture(self._motion, k))
+        worst = min((self._at(k, state) for state in states), key=_Known.order)
+        unstable = worst.delay == 0.0
+        if worst.delay is not None:
+            self._found[k] = InstantMargin(
+                basis=Basis.EXACT, delay=worst.delay, unstable_roots=worst.roots
+            )
+        if self._best is None or worst.order() < self._best.order():
+            self._best, self._critical = worst, k
         return unstable
 
-    def _keep(
-        self,
-        k: int,
-        margin: DelayMargin | None,
-        loop: FrozenLoop | None,
-        rest: Rest,
-        problem: str,
-    ) -> None:
-        """Keep the instant if its margin is the smallest so far."""
-        if self._best is not None:
-            old, new = self._found[self._best[-1]], self._found[k]
-            if new.basis is Basis.OPEN:
-                return
-            if old.basis is not Basis.OPEN and (old.delay, -old.unstable_roots) <= (
-                new.delay,
-                -new.unstable_roots,
-            ):
-                return
-        self._best = margin, loop, rest, problem, k
+    def _at(self, k: int, state: Rest) -> "_Known":
+        """What is known of the loop of an instant, frozen at a state."""
+        loop, margin, problem = None, None, state.reason
+        try:
+            loop = self._system.frozen(self._motion, k, rest=state)
+            margin = margin_of(loop)
+        except (ContractionError, SolverError) as error:
+            problem = problem or str(error)
+        return _Known(margin=margin, loop=loop, rest=state, problem=problem)
 
     def _bounded(self) -> Array:
         """Instants (N,) at which a potential decides: stable, with a margin above the bound."""

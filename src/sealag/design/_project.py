@@ -249,11 +249,35 @@ def _actuators(section: Any, robot: Robot, path: Path) -> Actuators:
                     f"{path}: {key} of joint {name} is missing; "
                     f"give it in [actuators.default] or [actuators.joint.{name}]."
                 )
-    optional = {key for values in every for key in values}
-    for key in optional:
-        fallback = np.inf if key in {"torque_limit", "velocity_limit", "torque_bandwidth"} else 0.0
-        columns[key] = [values.get(key, fallback) for values in every]
+    optional = {key for values in every for key in values} - set(_REQUIRED)
+    for key in _REQUIRED:
+        columns[key] = [values[key] for values in every]
+    for key in optional | set(_OF_URDF):
+        fallback = _fallback(key, robot)
+        columns[key] = [values.get(key, own) for values, own in zip(every, fallback, strict=True)]
     return actuators(robot.joints, **columns)
+
+
+_OF_URDF = ("torque_limit", "velocity_limit", "coulomb_friction")
+"""Keys of actuators whose values the URDF states where the project does not."""
+
+
+def _fallback(key: str, robot: Robot) -> Array:
+    """What holds for joints (n,) at which the project does not give a key.
+
+    A velocity limit of 0 in a URDF forbids every motion: it stands for one that is not known.
+    """
+    match key:
+        case "torque_limit":
+            return robot.effort_limit
+        case "velocity_limit":
+            return np.where(robot.velocity_limit > 0.0, robot.velocity_limit, np.inf)
+        case "coulomb_friction":
+            return robot.friction
+        case "torque_bandwidth":
+            return np.full(robot.n, np.inf)
+        case _:
+            return np.zeros(robot.n)
 
 
 def _delays(section: Any, folder: Path, path: Path) -> Delays:

@@ -84,13 +84,8 @@ def _recomputed(data: dict[str, Any], system: System, motion: Motion | None) -> 
             yield Check(name=f"design: {name}", ok=not where, detail=words)
     if data["time_s"] != fresh["time_s"]:
         return
-    taken = system.still() if motion is None else motion
-    spaces = system.spaces(taken)
+    spaces = system.spaces(motion)
     rest = system.rest() if motion is None else None
-    if rest is not None:
-        from dataclasses import replace
-
-        spaces = system.spaces(replace(taken, q=rest.fed_back[None]))
     kind = Criterion(data["criterion"])
     bounds = (
         published_bounds(spaces, system)

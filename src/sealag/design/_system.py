@@ -22,6 +22,7 @@ from sealag.whole_body import (
     Rest,
     Spaces,
     freeze,
+    posture_of,
     rest_of,
     spaces_along,
 )
@@ -156,6 +157,17 @@ class System:
         q, contacts = self._held(motion, instant)
         return rest_of(self.robot, self.law, self.actuators, q, contacts=contacts)
 
+    def in_posture(self, motion: Motion | None = None, instant: int = 0) -> Rest:
+        """Return the loop's state in an instant's configuration: tasks without error, springs
+        that carry gravity.
+
+        Args:
+            motion: its instants; the posture if None.
+            instant: which one.
+        """
+        q, contacts = self._held(motion, instant)
+        return posture_of(self.robot, self.law, self.actuators, q, contacts=contacts)
+
     def frozen(
         self, motion: Motion | None = None, instant: int = 0, *, rest: Rest | None = None
     ) -> FrozenLoop:
@@ -188,7 +200,7 @@ class System:
 
     @property
     def late_joints(self) -> tuple[str, ...]:
-        """Joints whose drives feed back a torque that is late; with B_s = B there is no feedback."""
+        """Joints whose drives feed back a late torque; with B_s = B there is no feedback."""
         if not self.delays.torque_feedback_delay:
             return ()
         fed_back = self.actuators.inertia_shaping != 1.0

@@ -267,9 +267,7 @@ def _border(loop: Loop, phi: float, root: complex, *, left: Array, right: Array)
     return _Border(complex(inverse[n, n]), by_root, by_turn, v, slope=-by_turn / by_root)
 
 
-def _newton(
-    loop: Loop, phi: float, omega: float, *, left: Array, right: Array
-) -> _Point | None:
+def _newton(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -> _Point | None:
     """Newton's method on g(jω, φ) = 0 in the real unknowns φ and ω."""
     best: tuple[float, float, float, _Border] | None = None
     try:

@@ -29,9 +29,7 @@ def delay_store(
     return stored, np.maximum.accumulate(np.abs(stored - other))
 
 
-def _store(
-    time: Array, theta: Array, theta_dot: Array, Y: Array, delay: float, at: Array
-) -> Array:
+def _store(time: Array, theta: Array, theta_dot: Array, Y: Array, delay: float, at: Array) -> Array:
     """V_4 at instants (A,): with P = ∫p and PP = ∫P, ∫(ξ − t + d) p dξ = d P(t) − PP(t) + PP(t−d)."""
     step = np.diff(time)
     whole = _integrals(theta, theta_dot, Y, np.arange(len(step)), step, step)

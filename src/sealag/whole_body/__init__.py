@@ -10,7 +10,7 @@ from sealag.whole_body._protocol import (
     TankController,
     TickController,
 )
-from sealag.whole_body._rest import Rest, rest_of
+from sealag.whole_body._rest import Rest, posture_of, rest_of
 from sealag.whole_body._signals import (
     SIGNAL_NAMES,
     LawDerivative,
@@ -66,6 +66,7 @@ __all__ = [
     "TaskKind",
     "TickController",
     "freeze",
+    "posture_of",
     "relative_asymmetry",
     "rest_of",
     "sea_loop",

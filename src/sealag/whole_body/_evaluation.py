@@ -102,7 +102,7 @@ class LawEvaluation:
         self.error, self.offset, self.wanted = np.zeros(m), np.zeros(m), np.zeros(m)
         self._motion, self._along = np.zeros(nv), np.zeros((nv, n))
         self.planned_gravity, self._unused = np.zeros(n), np.zeros(n)
-        self._step, self._square, self._joints = np.zeros(n), np.zeros((n, n)), np.zeros(n)
+        self._step, self._square = np.zeros(n), np.zeros((n, n))
         self._slope, self._slopes = np.zeros((n, n)), (np.zeros((nv, nv)), np.zeros((nv, n)))
 
     @property
@@ -137,7 +137,6 @@ class LawEvaluation:
         Raises:
             RobotError: the mass matrix is not positive definite.
         """
-        self._joints = joints
         good = self._kernel.law(
             self.robot.tree, self._terms, self._seen, self._tasks, self._gains,
             (q, joints, self._along, self.offset),
@@ -145,11 +144,6 @@ class LawEvaluation:
         )  # fmt: skip
         if not good:
             raise RobotError(f"The mass matrix of {self.robot.name} is not positive definite.")
-
-    def configuration(self, q: Array) -> Array:
-        """Return the configuration (nq,) that a measured one (nq,) was last moved to."""
-        away = self._joints - self.robot.joint_positions(q)
-        return self.robot.integrate(q, self._along @ away)
 
     def settled(self, evaluate: Callable[[], None], away: Callable[[], Array]) -> None:
         """Evaluate again until the base follows as it does where the law is evaluated.

@@ -215,12 +215,12 @@ def sea_loop(
     spring += actuators.spring_damping[:, None] * (rate - link_rate)
     drag = np.broadcast_to(joint_damping, n)[:, None] * link_rate
     rows = _motor_rows(actuators, instant=embedded_delay is None)
-    moved = (angle, rate, torque, link, link_rate)
+    moved = np.stack([angle, rate, torque, link, link_rate])
     A_0, B = np.zeros((at.size, at.size)), np.zeros((at.size, n))
     A_0[at.z, at.z_rate], A_0[at.theta, at.theta_rate] = np.eye(k), one
     A_0[at.z_rate] = np.linalg.solve(M, S.T @ (spring - drag) - at.take(at.z, H))
-    A_0[at.theta_rate] = sum(own[:, None] * part for own, part in zip(rows.speed, moved))
-    A_0[at.torque] = sum(own[:, None] * part for own, part in zip(rows.torque, moved))[drives]
+    A_0[at.theta_rate] = np.einsum("pi,pij->ij", rows.speed, moved)
+    A_0[at.torque] = np.einsum("pi,pij->ij", rows.torque, moved)[drives]
     B[at.theta_rate] = np.diag(rows.speed_command)
     B[at.torque] = np.diag(rows.torque_command)[drives]
     C = at.take(at.z, C_z) + at.take(at.theta, C_theta)
@@ -267,11 +267,11 @@ def _without_momentum(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _MotorRows:
-    """Rates of motor speeds and drive torques, one coefficient a joint, in the order of angle,
-    speed, drive torque, link angle, link speed; and what a command and late torque feedback do."""
+    """Rates of motor speeds and drive torques (5, n): what angle, speed, drive torque, link angle
+    and link speed do; and what a command (n,) and late torque feedback (n,) do."""
 
-    speed: tuple[Array, ...]
-    torque: tuple[Array, ...]
+    speed: Array
+    torque: Array
     speed_command: Array
     torque_command: Array
     shift: Array
@@ -281,7 +281,7 @@ def _motor_rows(actuators: Actuators, *, instant: bool) -> _MotorRows:
     """Take the rows from the generator that moves the motors in the simulator."""
     from sealag.kernels import motor
 
-    moved = (motor.ANGLE, motor.SPEED, motor.TORQUE, motor.LINK, motor.LINK_SPEED)
+    moved = [motor.ANGLE, motor.SPEED, motor.TORQUE, motor.LINK, motor.LINK_SPEED]
     A, forms = (
         np.zeros((motor.SIZE, motor.SIZE)),
         np.zeros((motor.PRODUCTS, motor.SIZE, motor.SIZE)),
@@ -293,8 +293,8 @@ def _motor_rows(actuators: Actuators, *, instant: bool) -> _MotorRows:
     stacked = np.array(every)
     ratio = actuators.rotor_inertia / actuators.shaped_inertia
     return _MotorRows(
-        speed=tuple(stacked[:, motor.SPEED, place] for place in moved),
-        torque=tuple(stacked[:, motor.TORQUE, place] for place in moved),
+        speed=stacked[:, motor.SPEED, moved].T,
+        torque=stacked[:, motor.TORQUE, moved].T,
         speed_command=stacked[:, motor.SPEED, motor.COMMAND],
         torque_command=stacked[:, motor.TORQUE, motor.COMMAND],
         shift=(1.0 - ratio) / ratio,

@@ -69,7 +69,7 @@ class LinkPlant:
         return np.concatenate(parts)
 
     def support(self, q: Array, springs: Array | None = None) -> Array:
-        """Return J_sᵀ λ (nv,), the contact forces of least norm that carry what springs (n,) do not;
+        """Return J_sᵀ λ (nv,), contact forces of least norm that carry what springs (n,) do not;
         without springs, what they carry of the base alone."""
         return self.jacobian(q).T @ self._force(q, springs)
 

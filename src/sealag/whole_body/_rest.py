@@ -17,6 +17,9 @@ _BALANCED = 1e-10
 """Share of weight and torques that may be left over. Ten times smaller is rounding of the law; at
 ten times larger the margin's last digits move."""
 
+_AT_POSTURE = 1e-7
+"""The same of gravity that contacts must balance in the posture, whose angles are rounded."""
+
 _PLACED = 1e-12  # m, rad: how far a contact may be from where the posture has it
 _ROUNDS = 60
 _LONGEST_STEP = 0.2  # rad: a longer Newton step leaves the region where its direction is good
@@ -30,8 +33,6 @@ class Rest:
 
     Attributes:
         q: (nq,) configuration; the posture itself if none was found.
-        fed_back: (nq,) configuration that the law takes its matrices at, moved from q to the angles
-            of its signal.
         theta: (n,) motor angles, rad.
         tau_sea: (n,) spring torque there, Nm.
         found: whether all balances: links, springs, motors and contacts.
@@ -40,7 +41,6 @@ class Rest:
     """
 
     q: Array
-    fed_back: Array
     theta: Array
     tau_sea: Array
     found: bool
@@ -75,6 +75,32 @@ def rest_of(
     return _Search(robot, law, actuators, posture, contacts).run()
 
 
+def posture_of(
+    robot: Robot,
+    law: Law,
+    actuators: Actuators,
+    posture: Array,
+    *,
+    contacts: tuple[Contact, ...],
+) -> Rest:
+    """Return the loop's state in the posture: tasks without error, springs that carry gravity.
+
+    It is where the loop rests if its references are corrected for the sag of a law that feeds back
+    motor angles, or if an operator has brought it there.
+
+    Args:
+        robot: the robot.
+        law: the law.
+        actuators: its springs.
+        posture: (nq,) configuration.
+        contacts: which frames are held.
+
+    Raises:
+        RobotError: the mass matrix is not positive definite.
+    """
+    return _Search(robot, law, actuators, posture, contacts).posture()
+
+
 class _Search:
     """Newton's method on q and θ."""
 
@@ -103,7 +129,8 @@ class _Search:
             residual = self._residual(q, theta)
             for _ in range(_ROUNDS):
                 if self._small(residual):
-                    return self._answer(q, theta, self._overload(q, theta))
+                    springs = self._K * (theta - self._robot.joint_positions(q))
+                    return self._answer(q, theta, self._overload(springs))
                 step = self._newton(q, theta, residual)
                 q, theta, residual, better = self._search(q, theta, step, residual)
                 if not better:
@@ -111,6 +138,27 @@ class _Search:
         except ContractionError as error:
             return self._answer(self._posture, self._first(self._posture), str(error))
         return self._answer(self._posture, self._held(), self._why())
+
+    def posture(self) -> Rest:
+        """Return the state in the posture."""
+        q, base = self._posture, self._robot.nv_base
+        joints = self._robot.joint_positions(q)
+        evaluation = self._evaluation
+        evaluation.follow(q)
+        carried = evaluation.space.gravity.copy()
+        left = self._robot.gravity(q)
+        left[base:] -= carried
+        Z = null_space(self._plant.jacobian(q), self._robot.nv)
+        balanced = np.abs(Z.T @ left).max(initial=0.0) < _AT_POSTURE * self._scale
+        reason = self._overload(carried) if balanced else self._why()
+        return Rest(
+            q=q,
+            theta=joints + self._signal.wound(carried),
+            tau_sea=carried,
+            found=not reason,
+            moved=0.0,
+            reason=reason,
+        )
 
     def _first(self, q: Array) -> Array:
         """Motor angles whose springs carry gravity as far as contacts do not."""
@@ -202,31 +250,23 @@ class _Search:
             )
         return "no balance of springs, gravity and law was found near the posture"
 
-    def _overload(self, q: Array, theta: Array) -> str:
-        """Which motor cannot give the torque of this rest; empty if all can."""
-        torque = np.abs(self._K * (theta - self._robot.joint_positions(q)))
+    def _overload(self, springs: Array) -> str:
+        """Which motor cannot give a torque (n,) that springs carry; empty if all can."""
+        torque = np.abs(springs)
         over = np.flatnonzero(torque > self._limit)
         if not len(over):
             return ""
         i = over[0]
         return (
-            f"the motor of {self._robot.joints[i]} gives at most {self._limit[i]:g} Nm, and to hold "
-            f"the posture it needs {torque[i]:.3g} Nm"
+            f"the motor of {self._robot.joints[i]} gives at most {self._limit[i]:g} Nm, and to "
+            f"hold the posture it needs {torque[i]:.3g} Nm"
         )
-
-    def _fed_back(self, q: Array, theta: Array) -> Array:
-        try:
-            self._signal.settled(q, theta, np.zeros(self._robot.n))
-        except ContractionError:
-            return q
-        return self._evaluation.configuration(q)
 
     def _answer(self, q: Array, theta: Array, reason: str) -> Rest:
         joints = self._robot.joint_positions(q)
         moved = np.abs(joints - self._robot.joint_positions(self._posture))
         return Rest(
             q=q,
-            fed_back=self._fed_back(q, theta),
             theta=theta,
             tau_sea=self._K * (theta - joints),
             found=not reason,

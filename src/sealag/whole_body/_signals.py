@@ -1,4 +1,4 @@
-"""What the law is taken at: four signals, each with its stiffness, refusal, potential and memory."""
+"""What the law is taken at: signals with their stiffness, refusal, potential and memory."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
@@ -9,6 +9,7 @@ from sealag.errors import InputError, UnknownNameError, either
 from sealag.typing import Array, BoolArray
 from sealag.whole_body._protocol import Measurement
 from sealag.whole_body._tank import EnergyTank, TankFlow
+from sealag.whole_body._tasks import GravityCompensation
 
 if TYPE_CHECKING:
     from sealag.whole_body._evaluation import LawEvaluation
@@ -103,6 +104,11 @@ class SignalState(Protocol):
         """Write the command (n,) of the true state; the memory stays as it is."""
         ...
 
+    def wound(self, carried: Array) -> Array:
+        """Return θ − q_j (n,) at which the tasks have no error, given the torque (n,) that springs
+        carry in the posture, Nm."""
+        ...
+
     def settled(self, q: Array, theta: Array, out: Array) -> None:
         """Write the command (n,) of a state that does not move, once it has settled."""
         ...
@@ -120,21 +126,13 @@ class SignalState(Protocol):
 class Signal(Protocol):
     """The signal that a law is taken at."""
 
-    @property
-    def name(self) -> str:
-        """Its word in project files and certificates."""
-        ...
-
-    @property
-    def has_potential(self) -> bool:
-        """Whether the feedback of it is collocated with the motors."""
-        ...
-
-    @property
-    def rests_at_posture(self) -> bool:
-        """Whether its error is 0 in the posture although springs carry gravity there, and nothing
-        is remembered."""
-        ...
+    name: ClassVar[str]
+    """Its word in project files and certificates."""
+    has_potential: ClassVar[bool]
+    """Whether the feedback of it is collocated with the motors."""
+    rests_at_posture: ClassVar[bool]
+    """Whether its error is 0 in the posture although springs carry gravity there, and nothing is
+    remembered."""
 
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
         """Return −∂τ_osc/∂θ (…, n, n) of a law with joint stiffness F_q (…, n, n), springs K (n,);
@@ -181,6 +179,10 @@ class _Memoryless:
         self.command(0.0, measurement, out)
         energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
         return Present(energy, self._joints(measurement.q, measurement.theta))
+
+    def wound(self, carried: Array) -> Array:
+        """Return 0 for motor angles, what springs are wound by for link angles."""
+        return carried / self._law.spring_stiffness if self._links else np.zeros_like(carried)
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
         """Write the command of a state that does not move."""
@@ -282,6 +284,11 @@ class _Static:
         energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
         energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
         return Present(energy, measurement.theta + sag)
+
+    def wound(self, carried: Array) -> Array:
+        """Return K⁻¹ ḡ of the compensation, at which q̄(θ) = q_j."""
+        none = self._law.law.gravity is GravityCompensation.NONE
+        return np.zeros_like(carried) if none else carried / self._law.spring_stiffness
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
         """Write the command at q̄ of a state that does not move."""
@@ -392,7 +399,7 @@ class _Filled:
         law.torque(out)
 
     def _matrices(self, q: Array, theta: Array) -> None:
-        """Compensation that is fed back is taken at θ, whose gradient it has; else nothing moves."""
+        """Take compensation that is fed back at θ, whose gradient it has."""
         if self._law.gravity_is_fed_back:
             self._law.at(q, theta, self._unused)
 
@@ -407,6 +414,10 @@ class _Filled:
         law.torque(out)
         energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy
         return Present(energy, measurement.theta)
+
+    def wound(self, carried: Array) -> Array:
+        """Return that of q̄(θ)."""
+        return self._static.wound(carried)
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
         """Write the command once x̂ has come to x(q̄(θ))."""

@@ -1,5 +1,6 @@
 """Contact-consistent operational space along a motion: J*, Λ and the fed-back stiffness."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -232,7 +233,7 @@ def _ranks(robot: Robot, at: _SpacesAt, levels: list[int]) -> Array:
     """Directions that joints have, and that each level has, (N, 1 + levels)."""
     joints = np.trace(at.along[:, robot.nv_base :], axis1=1, axis2=2)
     columns = [np.round(joints)]
-    for first, last in zip(levels, levels[1:]):
+    for first, last in itertools.pairwise(levels):
         values = np.linalg.eigvalsh(at.Lambda[:, first:last, first:last])
         columns.append((values > _EMPTY * values[:, -1:]).sum(axis=1))
     return np.stack(columns, axis=1)
