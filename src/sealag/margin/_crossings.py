@@ -197,7 +197,10 @@ def _in_band(picture: Picture, band: Band) -> Found:
     rates = np.abs(np.diagonal(family.motion).real)
     room = 4.0 * (np.diagonal(family.blur) + 2.0 * half * rates)
     room = np.maximum(room, _ON_AXIS * np.abs(np.diagonal(family.motion)) * max(half, 1e-8))
-    near = np.flatnonzero(np.abs(family.values.real) <= room)
+    close = np.abs(family.values.real) <= room
+    if band.end:
+        close &= (family.values.imag >= 0.0)  # the conjugate is the mirror image
+    near = np.flatnonzero(close)
     found: list[Crossing] = []
     explained, decided = bool(len(near)), True
     for k in near:

@@ -109,9 +109,11 @@ def search(picture: Picture) -> tuple[list[Passage], list[Band]]:
         narrow = piece.upper - piece.lower <= picture.width(piece.centre)
         blurred = family is not None and family.blurred(piece.half)
         if not taken and (narrow or blurred):
-            bands.append(Band(lower=piece.lower, upper=piece.upper, end=piece.end == piece.end))
+            end = any(picture.symmetric(t) for t in (piece.lower, piece.upper))
+            bands.append(Band(lower=piece.lower, upper=piece.upper, end=end))
         elif not taken:
-            todo += _halves(piece)
+            resting = family is not None and family.rests
+            todo += _halves(piece if resting else piece._replace(end=math.nan))
         else:
             rest = [(piece.lower, lower), (upper, piece.upper)]
             todo += [Piece(a, b, math.nan) for a, b in rest if b > a]
