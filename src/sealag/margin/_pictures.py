@@ -138,11 +138,14 @@ class Frequency:
         loop: the loop.
         at_most: longest delay that counts, s; inf for all.
         reference: z_0, 1 or −1, for which no root lies on the imaginary axis.
+        seen_in: (n, n) basis in which bounds of the resolvent are taken, and its inverse: near the
+            eigenvectors they are closer.
     """
 
     loop: Loop
     at_most: float
     reference: float
+    seen_in: tuple[Array, Array]
 
     @property
     def edges(self) -> list[float]:
@@ -169,7 +172,9 @@ class Frequency:
         turned = slope @ right
         bent = slope @ (R @ turned) + 0.5 * e**2 * (loop.A_e @ right)
         rounding = (len(P) + 2) * EPS * (np.abs(left) @ np.abs(P) @ np.abs(right))
-        size, late = float(np.linalg.norm(R, 2)), float(np.linalg.norm(loop.A_e, 2))
+        V, inverse = self.seen_in
+        size = float(np.linalg.norm(inverse @ R @ V, 2))
+        late = float(np.linalg.norm(inverse @ loop.A_e @ V, 2))
 
         def remainder(h: float) -> float:
             grown = math.expm1(min(h * e, 500.0))
@@ -182,7 +187,8 @@ class Frequency:
             values=values + 0.5,
             motion=-1j * self.reference * (left @ turned),
             bend=-self.reference * np.sum(left * bent.T, axis=1),
-            rest=np.linalg.norm(left, axis=1)[:, None] * np.linalg.norm(right, axis=0),
+            rest=np.linalg.norm(left @ V, axis=1)[:, None]
+            * np.linalg.norm(inverse @ right, axis=0),
             blur=blur + rounding,
             remainder=remainder,
             real=self.symmetric(t),
@@ -219,6 +225,19 @@ class Frequency:
     def width(self, t: float) -> float:
         """Share of the frequency."""
         return 2e-9 * max(t, 1e-9 * self.loop.size)
+
+
+def frequency_of(loop: Loop, *, at_most: float, reference: float) -> Frequency:
+    """Choose the basis in which the resolvent is bounded.
+
+    Args:
+        loop: a loop with an embedded delay.
+        at_most: longest delay that counts, s; inf for all.
+        reference: z_0.
+    """
+    basis = _eigenbasis(loop.A_0 + reference * loop.A_1 + loop.A_e)
+    seen_in = (np.eye(len(loop.A_0)),) * 2 if basis is None else basis[1:3]
+    return Frequency(loop=loop, at_most=at_most, reference=reference, seen_in=seen_in)
 
 
 def _turned(h: float) -> float:

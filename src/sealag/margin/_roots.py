@@ -114,7 +114,7 @@ def _differentiation(N: int) -> Array:
 
 def _newton(loop: Loop, delay: float, root: complex) -> complex:
     """Newton on the smallest singular direction; the start where it wanders off."""
-    start = root
+    start, longest = root, max(_pieces(loop, delay))
     for _ in range(12):
         factor = np.exp(-root * delay)
         P, rate = loop.characteristic(root, factor)
@@ -125,7 +125,7 @@ def _newton(loop: Loop, delay: float, root: complex) -> complex:
             break
         step = values[-1] / slope
         root = root - step
-        if abs(root - start) > 0.1 * max(abs(start), 1.0 / delay):
+        if abs(root - start) > 0.1 * max(abs(start), 1.0 / longest):
             return start
         if abs(step) <= 1e-14 * max(abs(root), 1e-300):
             break
