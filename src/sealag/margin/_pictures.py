@@ -154,7 +154,11 @@ class Frequency:
         return [0.0, *np.geomspace(1e-3 * top, top, 16).tolist()]
 
     def family(self, t: float) -> Family | None:
-        """Eigenvalues of z_0 G(jω) about ω = t, moved by ½ so that |z| = 1 is the axis."""
+        """Eigenvalues of z_0 G(jω) about ω = t, moved by ½ so that |z| = 1 is the axis.
+
+        P moves by δ = jΔ P' + ε with |ε| ≤ (e^{he} − 1 − he) |A_e|, and G by −C R δ R B + the rest
+        C R (δR) (I + δR)⁻¹ δ R B.
+        """
         loop, e = self.loop, self.loop.embedded_delay
         P, slope = loop.characteristic(1j * t, self.reference)
         if t == 0.0:
@@ -172,23 +176,26 @@ class Frequency:
         turned = slope @ right
         bent = slope @ (R @ turned) + 0.5 * e**2 * (loop.A_e @ right)
         rounding = (len(P) + 2) * EPS * (np.abs(left) @ np.abs(P) @ np.abs(right))
-        V, inverse = self.seen_in
-        size = float(np.linalg.norm(inverse @ R @ V, 2))
-        late = float(np.linalg.norm(inverse @ loop.A_e @ V, 2))
+        V, to = self.seen_in
+        seen, late = to @ slope @ R @ V, to @ loop.A_e @ R @ V
+        along, across = float(np.linalg.norm(seen, 2)), float(np.linalg.norm(late, 2))
+        columns = np.linalg.norm(to @ turned, axis=0)
+        columns += e * np.linalg.norm(to @ (loop.A_e @ right), axis=0)
 
         def remainder(h: float) -> float:
-            grown = math.expm1(min(h * e, 500.0))
-            moved = h + late * grown
-            room = 1.0 - 1.0001 * moved * size
-            return late * (grown - h * e) + moved**2 * size / room if room > 0.0 else math.inf
+            bent = _turned(h * e)
+            moved = 1.0001 * (h * along + bent * across)
+            if not moved < 1.0:
+                return math.inf
+            share = bent / (h * e)
+            return h * (max(1.0, share) * moved / (1.0 - moved) + share)
 
         return Family(
             centre=t,
             values=values + 0.5,
             motion=-1j * self.reference * (left @ turned),
             bend=-self.reference * np.sum(left * bent.T, axis=1),
-            rest=np.linalg.norm(left @ V, axis=1)[:, None]
-            * np.linalg.norm(inverse @ right, axis=0),
+            rest=np.linalg.norm(left @ V, axis=1)[:, None] * columns,
             blur=blur + rounding,
             remainder=remainder,
             real=self.symmetric(t),
@@ -242,7 +249,7 @@ def frequency_of(loop: Loop, *, at_most: float, reference: float) -> Frequency:
 
 def _turned(h: float) -> float:
     """|e^{-jΔ} − 1 + jΔ| ≤ e^h − 1 − h for complex |Δ| ≤ h."""
-    return math.expm1(h) - h if h > 1e-3 else 0.5001 * h * h
+    return math.expm1(min(h, 500.0)) - h if h > 1e-4 else 0.5001 * h * h
 
 
 def _eigenbasis(A: Array) -> tuple[Array, Array, Array, Array] | None:
