@@ -37,7 +37,7 @@ def test_other_arguments_are_checked_the_same_way() -> None:
         delay_margin([[1.0]], None)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="symmetries is no array of numbers"):
         delay_margin([[0.0]], [[0.0]], symmetries="yaw")
-    with pytest.raises(InputError, match="horizon is nothing|horizon is no array|horizon is -1"):
+    with pytest.raises(InputError, match="horizon is -1"):
         delay_margin([[0.0]], [[-1.0]], horizon=-1.0)
     with pytest.raises(InputError, match="delay is no array of numbers"):
         rightmost_roots([[0.0]], [[-1.0]], "soon")  # type: ignore[arg-type]

@@ -202,7 +202,7 @@ def _in_band(picture: Picture, band: Band) -> Found:
     room = np.maximum(room, _ON_AXIS * np.abs(np.diagonal(family.motion)) * max(half, 1e-8))
     close = np.abs(family.values.real) <= room
     if band.end:
-        close &= (family.values.imag >= 0.0)  # the conjugate is the mirror image
+        close &= family.values.imag >= 0.0  # the conjugate is the mirror image
     near = np.flatnonzero(close)
     found: list[Crossing] = []
     explained, decided = bool(len(near)), True
@@ -273,9 +273,7 @@ def _border(loop: Loop, phi: float, root: complex, *, left: Array, right: Array)
     return _Border(complex(inverse[n, n]), by_root, by_turn, v, slope=-by_turn / by_root)
 
 
-def _newton(
-    loop: Loop, phi: float, omega: float, *, left: Array, right: Array
-) -> _Point | None:
+def _newton(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -> _Point | None:
     """Newton's method on g(jω, φ) = 0 in the real unknowns φ and ω."""
     best: tuple[float, float, float, _Border] | None = None
     try:

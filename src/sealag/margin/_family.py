@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.typing import Array, BoolArray
+from sealag.typing import Array
 
 _LINEAR = 2.0
 _EVEN = 8.0

@@ -252,8 +252,8 @@ def _neutral(parts: tuple[Array, ...], *, symmetries: ArrayLike | None) -> tuple
     lost = np.abs(stacked @ basis).max()
     if lost > _STRUCTURE * np.abs(stacked).max():
         raise SolverError(
-            "A column v of symmetries is moved by the dynamics, so it is none: A_0 v, A_1 v or A_e v "
-            f"is {lost:.2g} instead of 0."
+            "A column v of symmetries is moved by the dynamics, so it is none: A_0 v, A_1 v or "
+            f"A_e v is {lost:.2g} instead of 0."
         )
     newest = basis
     inverse = np.linalg.pinv(stacked, rcond=1e-12)

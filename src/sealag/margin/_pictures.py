@@ -1,8 +1,8 @@
 """Two ways to see a crossing: a turn φ of the delay factor, or a frequency ω, as the parameter.
 
-A root jω of delay d has z = e^{-jφ}, φ = ωd. With one delay, λ is an eigenvalue of A_0 + e^{-jφ} A_1
-and φ runs over half a turn. With an embedded delay that is no eigenvalue problem; there ω runs, and
-w = z_0/(z − z_0) is an eigenvalue of z_0 G(jω), G = C (jω − A_0 − z_0 A_1 − A_e e^{-jωe})⁻¹ B.
+A root jω of delay d has z = e^{-jφ}, φ = ωd. With one delay, λ is an eigenvalue of A_0 +
+e^{-jφ} A_1 and φ runs over half a turn. With an embedded delay that is no eigenvalue problem; there
+ω runs, and w = z_0/(z − z_0) is an eigenvalue of z_0 G(jω), G = C (jω − A_0 − z_0 A_1 − A_e e^{-jωe})⁻¹ B.
 """
 
 import math
@@ -243,7 +243,8 @@ def frequency_of(loop: Loop, *, at_most: float, reference: float) -> Frequency:
         reference: z_0.
     """
     basis = _eigenbasis(loop.A_0 + reference * loop.A_1 + loop.A_e)
-    seen_in = (np.eye(len(loop.A_0)),) * 2 if basis is None else basis[1:3]
+    identity = np.eye(len(loop.A_0))
+    seen_in = (identity, identity) if basis is None else basis[1:3]
     return Frequency(loop=loop, at_most=at_most, reference=reference, seen_in=seen_in)
 
 

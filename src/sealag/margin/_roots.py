@@ -23,8 +23,9 @@ def rightmost_roots(
     """Rightmost roots of det(λ − A_0 − A_1 e^{-λd} − A_e e^{-λe}) = 0.
 
     The generator of the solution semigroup is discretised on Chebyshev nodes over the longer delay,
-    in two pieces where there are two delays (Breda, Maset & Vermiglio), and every root refined by Newton's method on the characteristic
-    equation. Independent of `delay_margin`; a heuristic where `nodes` resolve too little.
+    in two pieces where there are two delays (Breda, Maset & Vermiglio), and every root refined by
+    Newton's method on the characteristic equation. Independent of `delay_margin`; a heuristic where
+    `nodes` resolve too little.
 
     Args:
         A_0: (n, n) undelayed part, 1/s.

@@ -7,6 +7,7 @@ at most once. What is too narrow to split is left as a band.
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 from sealag.errors import SolverError
@@ -87,7 +88,7 @@ def search(picture: Picture) -> tuple[list[Passage], list[Band]]:
         SolverError: more samples than any sensible loop needs.
     """
     edges = picture.edges
-    todo = [_piece(picture, one, other) for one, other in zip(edges, edges[1:], strict=False)]
+    todo = [_piece(picture, one, other) for one, other in pairwise(edges)]
     passages: list[Passage] = []
     bands: list[Band] = []
     samples = 0
