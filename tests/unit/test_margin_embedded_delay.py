@@ -15,8 +15,6 @@ def collocated(A_0, A_1, A_e, d: float, e: float, *, nodes: int = 44) -> np.ndar
     x = np.cos(np.pi * np.arange(nodes + 1) / nodes)
     ends = np.isin(np.arange(nodes + 1), (0, nodes))
     c = np.where(ends, 0.5, 1.0) * (-1.0) ** np.arange(nodes + 1)
-        nodes + 1
-    )
     D = np.outer(1.0 / c, c) / (x[:, None] - x + np.eye(nodes + 1))
     D = (D - np.diag(D.sum(axis=1))) * 2.0 / longest
     past = longest * (x - 1.0) / 2.0
