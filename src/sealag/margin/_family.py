@@ -147,12 +147,14 @@ class Family:
         if not (D > 0.0).all() or not np.isfinite(self.remainder(h)):
             return False
         apart = self._apart(h)
-        radius = _DISC * apart.min(axis=1)
+        same = apart <= _DISC**-2 * np.maximum(D[:, None], D)  # equal joints: looked at together
+        radius = _DISC * np.where(same, np.inf, apart).min(axis=1)
+        radius = np.minimum(radius, 1e300)
         near = np.minimum(radius, h * np.abs(self.motion).max(axis=1)) > D
         if not 2 <= near.sum() <= _MOST_DISCS or not self._clear(np.where(near, radius, D), h):
             return False
         for k in np.flatnonzero(near):
-            inside = np.maximum(D, apart[k] - radius[k])
+            inside = np.where(same[k], D, np.maximum(D, apart[k] - radius[k]))
             inside[k] = D[k]
             if not self._clear(inside, h):
                 return False

@@ -2,7 +2,8 @@
 
 A root jω of delay d has z = e^{-jφ}, φ = ωd. With one delay, λ is an eigenvalue of A_0 +
 e^{-jφ} A_1 and φ runs over half a turn. With an embedded delay that is no eigenvalue problem; there
-ω runs, and w = z_0/(z − z_0) is an eigenvalue of z_0 G(jω), G = C (jω − A_0 − z_0 A_1 − A_e e^{-jωe})⁻¹ B.
+ω runs, and w = z_0/(z − z_0) is an eigenvalue of z_0 G(jω),
+G = C (jω − A_0 − z_0 A_1 − A_e e^{-jωe})⁻¹ B.
 """
 
 import math
