@@ -18,7 +18,7 @@ from sealag.margin._loop import (
     time_of,
     undamped_whatever_the_delay,
 )
-from sealag.margin._pictures import Frequency, Picture, Turn
+from sealag.margin._pictures import Picture, Turn, frequency_of
 from sealag.margin._roots import loop_roots
 from sealag.margin._search import search
 from sealag.typing import Array, ArrayLike
@@ -244,9 +244,9 @@ def _picture(loop: Loop, *, longest: float, on_axis: bool) -> Picture | None:
             return None
         return Turn(loop=loop, at_most=longest)
     if not on_axis:
-        return Frequency(loop=loop, at_most=longest, reference=1.0)
+        return frequency_of(loop, at_most=longest, reference=1.0)
     if not _roots_without_delay(loop, sign=-1.0)[1]:
-        return Frequency(loop=loop, at_most=longest, reference=-1.0)
+        return frequency_of(loop, at_most=longest, reference=-1.0)
     return None
 
 
