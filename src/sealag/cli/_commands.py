@@ -7,8 +7,6 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sealag.cli._app import show_json
 from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
 from sealag.errors import FileError, InputError
@@ -142,7 +140,7 @@ def margin_project(
             f"{LONGEST_HORIZON_MS:g}."
         )
     system = load(project)
-    horizon = None if horizon_ms is None else seconds_fromtime_text(horizon_ms)
+    horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
     with _busy("computing margins"):
         found = local_margins(system, _motion(system, motion), horizon=horizon)
     answer: dict[str, Any] = found.summary()

@@ -16,6 +16,7 @@ from sealag.design._evidence import (
     frozen_loop,
     instant_proofs,
     moving_multiplier,
+    refuted_delay,
     without,
     worst_motion,
 )
@@ -248,7 +249,6 @@ def _answer(
         "status": Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
         "criterion": kind,
         "max_delay_s": max_delay_s,
-        "max_delay_upper_s": float(bounds.upper[worst]),
         "asymmetry": _finite(np.max(asymmetry(stack, bounds, kind))),
         "contraction": _finite(stack.contraction.max()),
         "reasons": tuple(reasons),
@@ -260,7 +260,9 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
     worst = int(np.argmin(bounds.delay))
     y = worst_motion(system, bounds, worst)
     power = system.actuators.motor_damping * np.abs(y) ** 2
-    margin, bound = local.margin_s, float(bounds.delay[worst])
+    margin, bound, upper = local.margin_s, float(bounds.delay[worst]), float(bounds.upper[worst])
+    if 0.0 < bound < np.inf:
+        upper = refuted_delay(system, bounds, worst, y) * (1.0 + 1e-13)
     known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
     return {
         "worst": Worst(
@@ -268,6 +270,7 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
             time_s=float(motion.time[worst]),
             direction=dict(zip(system.robot.joints, (power / power.sum()).tolist(), strict=True)),
         ),
+        "max_delay_upper_s": upper,
         "worst_motion": [y.real.tolist(), y.imag.tolist()],
         "conservatism": margin / bound if margin is not None and known else None,
     }

@@ -173,9 +173,27 @@ def worst_motion(system: System, bounds: Bounds, instant: int) -> Array:
         instant: the worst one.
     """
     root = 1.0 / np.sqrt(system.actuators.motor_damping)
-    A, phi = root[:, None] * bounds.F[instant] * root, bounds.angle[instant]
-    H = np.cos(phi) * (A + A.T) / 2.0 + 0.5j * np.sin(phi) * (A - A.T)
-    return root * np.linalg.eigh(H)[1][:, -1]
+    A, phi = root[:, None] * bounds.F[instant] * root, float(bounds.angle[instant])
+    for _ in range(100):
+        H = np.cos(phi) * (A + A.T) / 2.0 + 0.5j * np.sin(phi) * (A - A.T)
+        x = np.linalg.eigh(H)[1][:, -1]
+        before, phi = phi, -float(np.angle(x.conj() @ A @ x))
+        if abs(phi - before) <= 1e-14:
+            break
+    return root * x
+
+
+def refuted_delay(system: System, bounds: Bounds, instant: int, motion: Array) -> float:
+    """Delay above which a motion turns the delayed loop active, y* D_θ y / |y* F y|, s.
+
+    Args:
+        system: the design.
+        bounds: of the criterion.
+        instant: the worst one.
+        motion: (n,) complex motor velocities y.
+    """
+    power = float(system.actuators.motor_damping @ np.abs(motion) ** 2)
+    return power / max(abs(motion.conj() @ bounds.F[instant] @ motion), 1e-300)
 
 
 def frozen_loop(system: System, motion: Motion, stack: WholeBodyStack, *, instant: int) -> Local:
