@@ -146,8 +146,10 @@ def _row(d, name):
 
 
 def _links(d):
-    row = _row(d, "d/dt z0")
-    row[:] = [1.00001 * value for value in row]
+    for name in d["local_loop"]["states"]:
+        if name.startswith("d/dt z"):
+            row = _row(d, name)
+            row[:] = [1.00001 * value for value in row]
 
 
 def _entry(key, row, column, factor):
