@@ -347,7 +347,7 @@ def motion_claims(c: dict[str, Any], D: list[Fraction]) -> Iterator[Claim]:
     first = 0 if modes else time(c["first_crossing_s"])
     yield "margin is the first crossing", smallest == first, ""
     both = 0 < (smallest or 0) < math.inf and 0 < largest < math.inf
-    ratio = float(smallest) / float(largest) if both else None
+    ratio = float(smallest or 0) / float(largest) if both else None
     yield "conservatism", c["conservatism"] == ratio, f"{ratio}"
     yield _verdict(c, largest, smallest)
 

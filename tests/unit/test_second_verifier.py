@@ -47,11 +47,16 @@ def _scaled(*path, factor):
     return change
 
 
+def _shift(d):
+    for window in d["time_varying_windows"]:
+        window["centre"][0][0] *= 0.999
+
+
 FORGED = {
     "longer": ("moving", "instant 0: [[2D", _scaled("proofs", 0, "delay_s", factor=1.00001)),
     "multiplier": ("moving", "instant 0: W", _scaled("proofs", 0, "W", 0, 0, 1, factor=1.1)),
     "stiffness": ("moving", "instant 0: F follows", _scaled("proofs", 0, "F", 0, 0, factor=1.01)),
-    "springs": ("moving", "instant 0: F follows", _scaled("spring_stiffness", 0, factor=1.01)),
+    "springs": ("baxter", "instant 0: F follows", _scaled("spring_stiffness", 0, factor=1.01)),
     "damping": ("moving", "no longer delay", _scaled("D_theta", 0, factor=1.01)),
     "levels": (
         "crawl",
@@ -70,7 +75,7 @@ FORGED = {
     "place": (
         "moving",
         "windows hold the proven",
-        _scaled("time_varying_windows", 0, "centre", 0, 0, factor=0.999),
+        _shift,
     ),
     "cover": ("moving", "windows cover", lambda d: d["time_varying_windows"].pop()),
     "modes": ("moving", "unstable modes", lambda d: d.update(unstable_modes=3)),
@@ -138,7 +143,7 @@ def test_it_runs_as_a_file_and_by_the_command(tmp_path, capsys):
                  json.dumps({**data, "delay_s": None})):  # fmt: skip
         path.write_text(text)
         assert alone(path)[0] == 2
-        code, out, err = command(path)
+        code, _, err = command(path)
         assert code == 2
         assert err.startswith("sealag: ")
         assert err.count("\n") == 1
