@@ -17,7 +17,12 @@ EARLIER = 1e-6
 
 _TURN = 0.5
 _MOST_FREQUENCIES = 60_000
-_MOST_ANGLES = 20_000
+_MOST_ANGLES = 4_000
+_NARROW = 1e-3 * EARLIER
+_SLOW = 1e-4
+"""Pieces of the circle are not cut below the first, relative to their phase but at most to the
+second: rounding keeps narrower ones from being excluded, and their number would double."""
+
 _CHUNK = 512
 
 
@@ -113,8 +118,7 @@ def earliest_crossing(A_0: Array, A_1: Array, *, limit: float) -> float:
         if count > _MOST_ANGLES:
             return float(min(doubt, delays.min()))
         low, high = low[open_], high[open_]
-        narrow = high - low <= 4.0 * EPS * high
-        if narrow.any():
+        if (high - low <= _NARROW * np.maximum(high, _SLOW)).any():
             return float(delays[open_].min())
         middle = (low + high) / 2.0
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
