@@ -64,8 +64,8 @@ def _of_stability(motion: Motion, local: Local) -> Iterator[tuple[str, str]]:
         yield (
             "instants_decided",
             f"Stability was decided exactly at {local.count(Basis.EXACT)} of {len(motion)} "
-            f"instants, by the passive bound at {local.count(Basis.BOUND)}, and not at "
-            f"{local.count(Basis.OPEN)}.",
+            f"instants, by the passive bound at {local.count(Basis.BOUND)}, by a search for earlier "
+            f"crossings at {local.count(Basis.SEARCHED)}, and not at {local.count(Basis.OPEN)}.",
         )
     if local.problem:
         yield "critical_instant", f"At the critical instant {local.problem}."
@@ -173,6 +173,6 @@ def _of_contacts(system: System) -> Iterator[tuple[str, str]]:
     yield (
         "simulation",
         "What [simulation] says (scenario, duration_s, physics_step_ms, pushes with frame, "
-        "force_n, start_s and duration_s, drop_height, track_amplitude, track_frequency_hz, seed, and the "
-        "ground and feet) sets a run, not the loop.",
+        "force_n, start_s and duration_s, drop_height, track_amplitude, track_frequency_hz, seed, "
+        "and the ground and feet) sets a run, not the loop.",
     )

@@ -15,8 +15,10 @@ from sealag.design._evidence import (
     common_multiplier,
     instant_proofs,
     moving_multiplier,
+    refuted_delay,
     stated_loop,
     without,
+    without_bounds,
     worst_motion,
 )
 from sealag.design._local import Local, local_of
@@ -101,7 +103,8 @@ def certify(
     )
     if missing:
         bounds, common, moving = without(bounds, missing), None, None
-    local = local_of(system, motion, spaces, passive)
+    decided = passive if kind is Criterion.CERTIFIED else without_bounds(passive)
+    local = local_of(system, motion, spaces, decided)
     return Certificate(
         **_answer(
             system, spaces, bounds, kind=kind, local=local, open_=_left_open(system, common, moving)
@@ -218,7 +221,6 @@ def _answer(
         "status": Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
         "criterion": kind,
         "max_delay_s": max_delay_s,
-        "max_delay_upper_s": float(bounds.upper[worst]),
         "asymmetry": _finite(np.max(asymmetry(spaces, bounds, kind))),
         "contraction": _finite(spaces.contraction.max()),
         "reasons": tuple(reasons),
@@ -243,7 +245,9 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
     worst = int(np.argmin(bounds.delay))
     y = worst_motion(system, bounds, worst)
     power = system.actuators.motor_damping * np.abs(y) ** 2
-    margin, bound = local.margin_s, float(bounds.delay[worst])
+    margin, bound, upper = local.margin_s, float(bounds.delay[worst]), float(bounds.upper[worst])
+    if 0.0 < bound < np.inf:
+        upper = refuted_delay(system, bounds, worst, y) * (1.0 + 1e-13)
     known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
     return {
         "worst": Worst(
@@ -251,6 +255,7 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
             time_s=float(motion.time[worst]),
             direction=dict(zip(system.robot.joints, (power / power.sum()).tolist(), strict=True)),
         ),
+        "max_delay_upper_s": upper,
         "worst_motion": [y.real.tolist(), y.imag.tolist()],
         "conservatism": margin / bound if margin is not None and known else None,
     }

@@ -152,9 +152,10 @@ def _margins(c: Certificate) -> Iterator[Check]:
         and all(
             m >= (floor or 0.0)
             for m, b in zip(margins, basis)
-            if b is Basis.BOUND and m is not None
+            if b in (Basis.BOUND, Basis.SEARCHED) and m is not None
         ),
-        detail=f"{basis.count(Basis.BOUND)} instants: the passive bound of each, none below",
+        detail=f"{basis.count(Basis.BOUND)} instants: the passive bound of each; "
+        f"{basis.count(Basis.SEARCHED)} searched for crossings; none below the smallest margin",
     )
     at = c.critical.instant
     yield Check(
