@@ -213,7 +213,7 @@ def test_a_resealed_forgery_does_not_hold(name):
 
 def leaves(data, path=()):
     """Every place in plain data that holds a value; of a list, the first and the last."""
-    if isinstance(data, dict):
+    if isinstance(data, dict) and data:
         for key, value in data.items():
             yield from leaves(value, (*path, key))
     elif isinstance(data, list) and data:
@@ -224,13 +224,15 @@ def leaves(data, path=()):
 
 
 def other(value):
-    """Another value of the same type."""
+    """Another value of the same type; more than rounding where it is rounding."""
+    if isinstance(value, dict | list):
+        return {"x": "y"} if isinstance(value, dict) else ["x"]
     if isinstance(value, bool):
         return not value
     if isinstance(value, int):
         return value + 1
     if isinstance(value, float):
-        return 1.01 * value if value else 0.01
+        return 1.01 * value if abs(value) > 1e-6 else 0.01
     if isinstance(value, str):
         return 0.5 if value == "unbounded" else value + "x"
     return 0.5
