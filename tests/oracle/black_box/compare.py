@@ -1,0 +1,141 @@
+"""sealag's answer beside the black box's."""
+
+import math
+import time
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import sealag
+from oracle.black_box.law import Unsettled
+from oracle.black_box.loop import Answer, BlackBox, NoEquilibrium
+
+AGREEMENT = 1e-6
+"""Relative difference of margins."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What came of one design.
+
+    Attributes:
+        path: its project file.
+        kind: agree | refused | undecided | disagree | fault.
+        said: in a sentence.
+        seconds: of the black box, and of sealag.
+        answer: the black box's; None if it has none.
+    """
+
+    path: Path
+    kind: str
+    said: str
+    seconds: tuple[float, float]
+    answer: Answer | None
+
+
+def compare(path: Path, **broken: bool) -> Verdict:
+    """Ask both about a project file.
+
+    Args:
+        path: the project file.
+        broken: negative controls of the black box.
+    """
+    start = time.perf_counter()
+    try:
+        system = sealag.load(path)
+        theirs: Any = sealag.certify(system)
+    except sealag.SealagError as error:
+        return _verdict(path, "refused", _sentence(error), start, start, None)
+    except Exception as error:
+        return _verdict(path, "fault", f"sealag: {error!r}", start, start, None)
+    middle = time.perf_counter()
+    try:
+        ours = BlackBox(path, system, **broken).answer()
+    except (NoEquilibrium, Unsettled, sealag.SealagError) as error:
+        said = f"{type(error).__name__}: {error}"
+        silent = theirs.stable is None or theirs.local_margin_s is None
+        kind = "refused" if silent else "undecided"
+        if isinstance(error, NoEquilibrium) and theirs.stable:
+            kind, said = "disagree", f"no equilibrium ({error}), yet stable"
+        return _verdict(path, kind, said, start, middle, None)
+    except Exception as error:
+        return _verdict(path, "fault", f"black box: {error!r}", start, middle, None)
+    kind, said = judge(ours, theirs)
+    return _verdict(path, kind, said, start, middle, ours)
+
+
+def judge(ours: Answer, theirs: Any) -> tuple[str, str]:
+    """Return kind and sentence for two answers.
+
+    Args:
+        ours: the black box's.
+        theirs: sealag's certificate.
+    """
+    if theirs.stable is None or theirs.local_margin_s is None:
+        reasons = "; ".join(theirs.reasons)
+        if theirs.status == "certified":
+            return "disagree", "certified, and its margin or stability not known"
+        return ("refused", reasons) if reasons else ("disagree", "neither an answer nor a reason")
+    if not ours.decided:
+        return "undecided", f"a root is {ours.nearest:.1e} from the axis"
+    margin = _number(theirs.local_margin_s)
+    wrong = []
+    if bool(theirs.stable) != ours.stable:
+        wrong.append(f"stable {theirs.stable}, true {ours.stable}")
+    if theirs.unstable_modes != ours.unstable:
+        wrong.append(f"unstable modes {theirs.unstable_modes}, true {ours.unstable}")
+    if not same(margin, ours.margin):
+        wrong.append(f"margin {margin * 1e3:.6g} ms, true {ours.margin * 1e3:.6g} ms")
+    bound = _number(theirs.max_delay_s)
+    if theirs.status == "certified" and theirs.stable and bound > ours.margin * (1 + AGREEMENT):
+        wrong.append(f"certified to {bound * 1e3:.6g} ms, true {ours.margin * 1e3:.6g} ms")
+    if wrong:
+        return "disagree", "; ".join(wrong) + f" (sag {ours.rest.sag:.2g})"
+    return "agree", f"margin {ours.margin * 1e3:.6g} ms, {ours.unstable} unstable"
+
+
+def same(a: float, b: float) -> bool:
+    """Return whether two margins agree.
+
+    Args:
+        a: s, inf allowed.
+        b: s, inf allowed.
+    """
+    if math.isinf(a) or math.isinf(b):
+        return a == b
+    return abs(a - b) <= AGREEMENT * max(abs(a), abs(b))
+
+
+def _number(value: float | str) -> float:
+    return math.inf if isinstance(value, str) else float(value)
+
+
+def _sentence(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _verdict(path, kind, said, start, middle, answer) -> Verdict:
+    end = time.perf_counter()
+    middle = end if middle == start else middle
+    seconds = end - middle, middle - start
+    return Verdict(path=path, kind=kind, said=said, seconds=seconds, answer=answer)
+
+
+def report(verdicts: Sequence[Verdict] | Iterable[Verdict]) -> str:
+    """Return counts, costs, and a line for each design that did not agree.
+
+    Args:
+        verdicts: of a corpus.
+    """
+    verdicts = list(verdicts)
+    counts = Counter(v.kind for v in verdicts)
+    ours, theirs = (sum(v.seconds[k] for v in verdicts) for k in (0, 1))
+    lines = [
+        ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())),
+        f"black box {ours:.1f} s, sealag {theirs:.1f} s for {len(verdicts)} designs",
+    ]
+    for kind in ("fault", "disagree", "undecided", "refused"):
+        lines += [f"{kind}: {v.path}: {v.said}" for v in verdicts if v.kind == kind]
+    return "\n".join(lines)
