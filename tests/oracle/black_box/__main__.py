@@ -15,7 +15,9 @@ def main() -> int:
     """Compare a fresh corpus; leave the designs that disagree in the folder."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=int(os.environ.get("SEALAG_ORACLE_SEED", -1)))
-    parser.add_argument("--count", type=int, default=int(os.environ.get("SEALAG_ORACLE_COUNT", 300)))
+    parser.add_argument(
+        "--count", type=int, default=int(os.environ.get("SEALAG_ORACLE_COUNT", 300))
+    )
     parser.add_argument("--folder", type=Path, default=None)
     parser.add_argument("--suite", action="store_true", help="small robots only, as in the suite")
     given = parser.parse_args()

@@ -11,6 +11,7 @@ from typing import Any
 import sealag
 from oracle.black_box.law import Unsettled
 from oracle.black_box.loop import Answer, BlackBox, NoEquilibrium
+from oracle.black_box.roots import ScanLost
 
 AGREEMENT = 1e-6
 """Relative difference of margins."""
@@ -53,7 +54,7 @@ def compare(path: Path, **broken: bool) -> Verdict:
     middle = time.perf_counter()
     try:
         ours = BlackBox(path, system, **broken).answer()
-    except (NoEquilibrium, Unsettled, sealag.SealagError) as error:
+    except (NoEquilibrium, ScanLost, Unsettled, sealag.SealagError) as error:
         said = f"{type(error).__name__}: {error}"
         silent = theirs.stable is None or theirs.local_margin_s is None
         kind = "refused" if silent else "undecided"

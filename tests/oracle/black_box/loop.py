@@ -7,7 +7,7 @@ import numpy as np
 from oracle.black_box.body import Body
 from oracle.black_box.design import Design, read_design
 from oracle.black_box.law import Law, TankLaw, derivative
-from oracle.black_box.roots import Late, crossings, roots, unstable_count
+from oracle.black_box.roots import Late, first_crossing, roots, unstable_count
 
 MOST_STEPS = 60
 BALANCED = 1e-12
@@ -144,8 +144,11 @@ class BlackBox:
         kind = TankLaw if design.tank else Law
         self.law = kind(self.body, system, self.posture, self.drive.K, contacts)
 
-    def rest(self) -> Rest:
-        """Return the equilibrium next to the posture.
+    def rest(self, start: tuple[np.ndarray, np.ndarray] | None = None) -> Rest:
+        """Return the equilibrium that Newton's method reaches from the posture.
+
+        Args:
+            start: q and θ to begin with instead; without contacts only.
 
         Raises:
             NoEquilibrium: Newton's method finds none.
@@ -156,6 +159,8 @@ class BlackBox:
         basis = body.free(q)
         rank = body.nv - basis.shape[1]
         theta = q[body.nq - body.n :] + self.law.command(q, q[body.nq - body.n :]) / K
+        if start is not None:
+            q, theta = start
         left: list[float] = []
         for _ in range(MOST_STEPS):
             Z = body.free(q, rank)
@@ -280,19 +285,23 @@ class BlackBox:
         fast, slow = fast @ onto, slow @ onto
         return (fast, slow, rate), int(np.linalg.matrix_rank(fast - slow, tol=1e-7))
 
-    def answer(self) -> Answer:
+    def answer(self, rest: Rest | None = None) -> Answer:
         """Return what there is to say about the design.
+
+        Args:
+            rest: the equilibrium; that next to the posture if None.
 
         Raises:
             NoEquilibrium: it rests nowhere.
             Unsettled: the law has no derivative there.
         """
-        rest = self.rest()
+        rest = self.rest() if rest is None else rest
         loop = self.loop(rest)
         here = roots(loop.A_0, [*loop.fixed, loop.delayed])
         unstable, nearest = unstable_count(here)
-        found = crossings(loop.A_0, loop.fixed, loop.delayed)
-        margin, frequency = found[0] if found else (np.inf, np.nan)
+        margin, frequency = 0.0, float("nan")
+        if not unstable:
+            margin, frequency = first_crossing(loop.A_0, loop.fixed, loop.delayed)
         limit = self.drive.limit
         over = np.flatnonzero(np.abs(rest.torque) > limit)
         return Answer(
@@ -301,7 +310,7 @@ class BlackBox:
             unstable=unstable,
             nearest=nearest,
             rightmost=float(here.real.max()) if len(here) else -np.inf,
-            margin=0.0 if unstable else margin,
+            margin=margin,
             frequency=frequency,
             loop=loop,
         )

@@ -9,9 +9,17 @@ from scipy.optimize import linear_sum_assignment
 NODES = 24
 """Chebyshev intervals on a delay: |s d| up to about 10 keeps rounding accuracy."""
 FIRST_CELLS = 96
-DEEPEST = 2.0 * np.pi / FIRST_CELLS / 2**22
+MOST_SPECTRA = 4000
+"""Points of the unit circle at most; a scan that needs more has lost its way."""
+DEEPEST = 1e-9
+CLUSTER = 1e-6
+"""Relative distance below which eigenvalues share one subspace."""
 AXIS = 1e-9
 """Real parts below this share of a root's size are on the imaginary axis."""
+
+
+class ScanLost(RuntimeError):
+    """The scan of the unit circle does not end, or contradicts the roots at a delay."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +141,41 @@ def crossings(A_0: np.ndarray, fixed: list[Late], late: Late) -> list[tuple[floa
     return sorted(out)
 
 
+def first_crossing(A_0: np.ndarray, fixed: list[Late], late: Late) -> tuple[float, float]:
+    """Return delay and frequency of the first crossing of a loop that is stable without delay.
+
+    Collocated roots confirm it: none right of the axis at shorter delays, some just beyond.
+
+    Raises:
+        ScanLost: they contradict.
+    """
+    found = crossings(A_0, fixed, late)
+    delay, omega = found[0] if found else (np.inf, np.nan)
+    if not len(late.C):
+        return delay, omega
+    sizes = np.abs(np.linalg.eigvals(A_0))
+    longest = 8.0 / max(float(sizes.max()), 1e-3)  # what collocation resolves
+    shares = (0.25, 0.5, 0.75, 0.9, 0.99, 0.9999)
+    before = [s * delay for s in shares] if found else [s * 100.0 * longest for s in shares]
+    for d in before:
+        if unstable_at(A_0, fixed, late, d):
+            raise ScanLost(f"a root is right of the axis at {d:.6g} s, before {delay:.6g} s")
+    if found and not unstable_at(A_0, fixed, late, 1.0001 * delay):
+        raise ScanLost(f"no root is right of the axis just after {delay:.6g} s")
+    return delay, omega
+
+
+def unstable_at(A_0: np.ndarray, fixed: list[Late], late: Late, delay: float) -> bool:
+    """Return whether a root is right of the axis at a delay, from collocation."""
+    moved = Late(B=late.B, C=late.C, delay=delay)
+    found = eigvals(collocated(A_0, [*fixed, moved]))
+    for s in sorted(found, key=lambda s: -s.real)[:6]:
+        exact = polished(A_0, [*fixed, moved], s) if s.real > -1e-3 * (1.0 + abs(s)) else None
+        if exact is not None and exact.real > 0.0:
+            return True
+    return False
+
+
 def _exact_crossing(
     A_0: np.ndarray, fixed: list[Late], late: Late, delay: float, omega: float
 ) -> tuple[float, float] | None:
@@ -165,13 +208,17 @@ def _passages(A: np.ndarray, turned: np.ndarray) -> list[tuple[float, float]]:
     grid = np.linspace(0.0, np.pi, FIRST_CELLS // 2 + 1)
     found: list[tuple[float, float]] = []
     at = [(phi, *_spectrum(A, turned, phi)) for phi in grid]
-    cells = list(zip(at[:-1], at[1:], strict=True))
+    cells, spectra = list(zip(at[:-1], at[1:], strict=True)), len(at)
+    floor = 1e-14 * float(np.linalg.norm(A, 2))
     while cells:
         left, right = cells.pop()
-        passages = _cell(left, right)
+        passages = _cell(left, right, floor)
         if passages is None and right[0] - left[0] > DEEPEST:
             middle = 0.5 * (left[0] + right[0])
             between = (middle, *_spectrum(A, turned, middle))
+            spectra += 1
+            if spectra > MOST_SPECTRA:
+                raise ScanLost(f"{MOST_SPECTRA} spectra do not follow the eigenvalues")
             cells += [(left, between), (between, right)]
         else:
             found += passages or []
@@ -179,14 +226,25 @@ def _passages(A: np.ndarray, turned: np.ndarray) -> list[tuple[float, float]]:
 
 
 def _spectrum(A: np.ndarray, turned: np.ndarray, phi: float) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues of A + e^(−iφ) turned, and their derivatives in φ."""
+    """Eigenvalues of A + e^(−iφ) turned, and their derivatives in φ.
+
+    Eigenvalues that coincide move by the eigenvalues of the derivative on their common subspace.
+    """
     late = np.exp(-1j * phi) * turned
     values, V = np.linalg.eig(A + late)
-    rates = np.einsum("ij,jk,ki->i", np.linalg.pinv(V), -1j * late, V)
+    moved = np.linalg.pinv(V) @ (-1j * late @ V)
+    rates = np.diag(moved).copy()
+    order = np.argsort(values.real)
+    values, rates, moved = values[order], rates[order], moved[np.ix_(order, order)]
+    near = np.abs(values[:, None] - values[None, :]) < CLUSTER * (1.0 + np.abs(values))
+    for k in np.flatnonzero(near.sum(axis=1) > 1):
+        group = np.flatnonzero(near[k])
+        if group[0] == k:
+            rates[group] = np.linalg.eigvals(moved[np.ix_(group, group)])
     return values, rates
 
 
-def _cell(left: tuple, right: tuple) -> list[tuple[float, float]] | None:
+def _cell(left: tuple, right: tuple, floor: float) -> list[tuple[float, float]] | None:
     """Passages in a cell by cubic interpolation; None if it is too wide to tell."""
     a, values_a, rates_a = left
     b, values_b, rates_b = right
@@ -202,7 +260,7 @@ def _cell(left: tuple, right: tuple) -> list[tuple[float, float]] | None:
         reach = max(abs(dx), abs(dy), abs(y - x))
         if min(abs(x.real), abs(y.real)) > 2.0 * reach + 4.0 * cost[i, j]:
             continue
-        if cost[i, j] > 0.05 * max(reach, 1e-9 * (1.0 + abs(x))):
+        if cost[i, j] > 0.05 * max(reach, 1e-7 * (1.0 + abs(x)), 100.0 * floor):
             return None
         if reach < 1e-12 * (1.0 + abs(x)):
             continue  # the delayed signal does not move it
