@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sealag
-from oracle.black_box.compare import compare, judge, report
+from oracle.black_box.compare import ask_sealag, compare, judge, report
 from oracle.black_box.corpus import SUITE, random_design
 
 SEED = int(os.environ.get("SEALAG_ORACLE_SEED", 20161115))
@@ -51,7 +51,7 @@ def test_a_wrong_margin_is_noticed(verdicts, tmp_path):
         ours = verdict.answer
         if verdict.kind != "agree" or not 0.0 < ours.margin < np.inf:
             continue
-        theirs = sealag.certify(sealag.load(verdict.path))
+        theirs = ask_sealag(sealag.load(verdict.path))
         assert judge(ours, theirs)[0] == "agree"
         assert judge(replace(ours, margin=ours.margin * (1 + 2e-6)), theirs)[0] == "disagree"
         assert judge(replace(ours, unstable=1), theirs)[0] == "disagree"

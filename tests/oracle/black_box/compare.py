@@ -12,9 +12,57 @@ import sealag
 from oracle.black_box.law import Unsettled
 from oracle.black_box.loop import Answer, BlackBox, NoEquilibrium
 from oracle.black_box.roots import ScanLost
+from sealag.design import local_margins
 
 AGREEMENT = 1e-6
 """Relative difference of margins."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Theirs:
+    """What sealag says.
+
+    Attributes:
+        status: of the certificate.
+        stable: whether no root is unstable; None if it does not say.
+        unstable: their number; None likewise.
+        margin: s; None likewise.
+        bound: certified delay, s.
+        reasons: against certification.
+    """
+
+    status: str
+    stable: bool | None
+    unstable: int | None
+    margin: float | None
+    bound: float
+    reasons: tuple[str, ...]
+
+
+def ask_sealag(system: Any) -> Theirs:
+    """Return what `certify` says, and where it gives no margin what `margin` says.
+
+    Args:
+        system: the design.
+    """
+    found: Any = sealag.certify(system)
+    stable, unstable, margin = found.stable, found.unstable_modes, _number(found.local_margin_s)
+    if margin is None or stable is None:
+        try:
+            local = local_margins(system)
+        except sealag.SealagError:
+            stable = unstable = margin = None
+        else:
+            unstable, margin = local.unstable_modes, _number(local.delay_s)
+            stable = unstable == 0
+    return Theirs(
+        status=str(found.status),
+        stable=stable,
+        unstable=unstable,
+        margin=margin,
+        bound=_number(found.max_delay_s) or 0.0,
+        reasons=tuple(found.reasons),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +94,7 @@ def compare(path: Path, **broken: bool) -> Verdict:
     start = time.perf_counter()
     try:
         system = sealag.load(path)
-        theirs: Any = sealag.certify(system)
+        theirs = ask_sealag(system)
     except sealag.SealagError as error:
         return _verdict(path, "refused", _sentence(error), start, start, None)
     except Exception as error:
@@ -56,7 +104,7 @@ def compare(path: Path, **broken: bool) -> Verdict:
         ours = BlackBox(path, system, **broken).answer()
     except (NoEquilibrium, ScanLost, Unsettled, sealag.SealagError) as error:
         said = f"{type(error).__name__}: {error}"
-        silent = theirs.stable is None or theirs.local_margin_s is None
+        silent = theirs.stable is None or theirs.margin is None
         kind = "refused" if silent else "undecided"
         if isinstance(error, NoEquilibrium) and theirs.stable:
             kind, said = "disagree", f"no equilibrium ({error}), yet stable"
@@ -67,29 +115,27 @@ def compare(path: Path, **broken: bool) -> Verdict:
     return _verdict(path, kind, said, start, middle, ours)
 
 
-def judge(ours: Answer, theirs: Any) -> tuple[str, str]:
+def judge(ours: Answer, theirs: Theirs) -> tuple[str, str]:
     """Return kind and sentence for two answers.
 
     Args:
         ours: the black box's.
-        theirs: sealag's certificate.
+        theirs: sealag's.
     """
-    if theirs.stable is None or theirs.local_margin_s is None:
+    if theirs.stable is None or theirs.margin is None:
         reasons = "; ".join(theirs.reasons)
         if theirs.status == "certified":
             return "disagree", "certified, and its margin or stability not known"
         return ("refused", reasons) if reasons else ("disagree", "neither an answer nor a reason")
     if not ours.decided:
         return "undecided", f"a root is {ours.nearest:.1e} from the axis"
-    margin = _number(theirs.local_margin_s)
-    wrong = []
+    margin, bound, wrong = theirs.margin, theirs.bound, []
     if bool(theirs.stable) != ours.stable:
         wrong.append(f"stable {theirs.stable}, true {ours.stable}")
-    if theirs.unstable_modes != ours.unstable:
-        wrong.append(f"unstable modes {theirs.unstable_modes}, true {ours.unstable}")
+    if theirs.unstable != ours.unstable:
+        wrong.append(f"unstable modes {theirs.unstable}, true {ours.unstable}")
     if not same(margin, ours.margin):
         wrong.append(f"margin {margin * 1e3:.6g} ms, true {ours.margin * 1e3:.6g} ms")
-    bound = _number(theirs.max_delay_s)
     if theirs.status == "certified" and theirs.stable and bound > ours.margin * (1 + AGREEMENT):
         wrong.append(f"certified to {bound * 1e3:.6g} ms, true {ours.margin * 1e3:.6g} ms")
     if wrong:
@@ -109,7 +155,9 @@ def same(a: float, b: float) -> bool:
     return abs(a - b) <= AGREEMENT * max(abs(a), abs(b))
 
 
-def _number(value: float | str) -> float:
+def _number(value: float | str | None) -> float | None:
+    if value is None:
+        return None
     return math.inf if isinstance(value, str) else float(value)
 
 

@@ -1,4 +1,4 @@
-"""Random designs as TOML texts: every choice a project file leaves, at scales that fit the robot."""
+"""Random designs as TOML texts: every choice a project file has, at scales that fit the robot."""
 
 import math
 from dataclasses import dataclass, field

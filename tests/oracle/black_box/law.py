@@ -1,7 +1,8 @@
-"""The law that runs, as a function of what is measured: the controller's own tick, differentiated."""
+"""The law that runs: the controller's own tick as a function of a measurement, differentiated."""
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -123,7 +124,7 @@ class TankLaw(Law):
         return super().settled(q, theta, period=10.0 if period == PERIOD else period)
 
     def slopes(self, q: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return ∂τ_osc/∂(v, θ) at once and after x̂ has followed, (n, nv + n), and its rate, 1/s."""
+        """Return ∂τ_osc/∂(v, θ) at once and once x̂ has followed, (n, nv + n), and its rate, 1/s."""
 
         def shifted(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return self._body.move(q, step[: self._body.nv]), theta + step[self._body.nv :]
@@ -145,7 +146,7 @@ class TankLaw(Law):
         return fast, slow, self._measured_rate(q, theta, fast - slow)
 
     def _measured_rate(self, q: np.ndarray, theta: np.ndarray, gap: np.ndarray) -> float:
-        """1/s, from one tick of a short period along the direction in which x̂ has most to follow."""
+        """1/s, from one short tick along the direction in which x̂ has most to follow."""
         if np.abs(gap).max() < 1e-9:
             return 1.0
         step = 1e-4 * np.linalg.svd(gap)[2][0]
@@ -190,6 +191,6 @@ def _extrapolated(f: Callable, size: int, width: float) -> tuple[np.ndarray, flo
     for h in (width, width / 2.0, width / 4.0):
         columns = [(f(h * e) - f(-h * e)) / (2.0 * h) for e in np.eye(size)]
         rows.append(np.stack(columns, axis=1))
-    first = [(4.0 * b - a) / 3.0 for a, b in zip(rows[:-1], rows[1:], strict=True)]
+    first = [(4.0 * b - a) / 3.0 for a, b in pairwise(rows)]
     last = (16.0 * first[1] - first[0]) / 15.0
     return last, float(np.abs(last - first[1]).max())

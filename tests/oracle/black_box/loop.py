@@ -155,7 +155,7 @@ class BlackBox:
         """
         body, K = self.body, self.drive.K
         q = self.posture
-        J, places = body.held(q)
+        _, places = body.held(q)
         basis = body.free(q)
         rank = body.nv - basis.shape[1]
         theta = q[body.nq - body.n :] + self.law.command(q, q[body.nq - body.n :]) / K
