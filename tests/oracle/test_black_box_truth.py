@@ -153,7 +153,7 @@ def test_slope_of_the_law_is_that_of_its_settled_command():
     black = box(EXAMPLES / "anymal.toml")
     rest, law, nv = black.rest(), black.law, black.body.nv
     C = law.slope(rest.q, rest.theta)
-    step = 1e-4 * np.random.default_rng(3).normal(size=C.shape[1])
+    step = 1e-5 * np.random.default_rng(3).normal(size=C.shape[1])
 
     def there(sign):
         return law.command(black.body.move(rest.q, sign * step[:nv]), rest.theta + sign * step[nv:])
