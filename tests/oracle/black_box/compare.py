@@ -103,16 +103,27 @@ def compare(path: Path, **broken: bool) -> Verdict:
     try:
         ours = BlackBox(path, system, **broken).answer()
     except (NoEquilibrium, ScanLost, Unsettled, sealag.SealagError) as error:
-        said = f"{type(error).__name__}: {error}"
-        silent = theirs.stable is None or theirs.margin is None
-        kind = "refused" if silent else "undecided"
-        if isinstance(error, NoEquilibrium) and theirs.stable:
-            kind, said = "disagree", f"no equilibrium ({error}), yet stable"
+        kind, said = without_loop(error, theirs)
         return _verdict(path, kind, said, start, middle, None)
     except Exception as error:
         return _verdict(path, "fault", f"black box: {error!r}", start, middle, None)
     kind, said = judge(ours, theirs)
     return _verdict(path, kind, said, start, middle, ours)
+
+
+def without_loop(error: Exception, theirs: Theirs) -> tuple[str, str]:
+    """Return kind and sentence where the black box has no loop to look at.
+
+    Args:
+        error: why.
+        theirs: sealag's answer.
+    """
+    said = f"{type(error).__name__}: {_sentence(error)}"
+    if isinstance(error, Unsettled | ScanLost):
+        return "undecided", said
+    if theirs.status == "certified" or theirs.stable:
+        return "disagree", f"{theirs.status}, stable {theirs.stable}, but {said}"
+    return "refused", said
 
 
 def judge(ours: Answer, theirs: Theirs) -> tuple[str, str]:
@@ -127,6 +138,8 @@ def judge(ours: Answer, theirs: Theirs) -> tuple[str, str]:
         if theirs.status == "certified":
             return "disagree", "certified, and its margin or stability not known"
         return ("refused", reasons) if reasons else ("disagree", "neither an answer nor a reason")
+    if ours.on_axis and theirs.stable:
+        return "disagree", "stable, but a root is on the axis"
     if not ours.decided:
         return "undecided", f"a root is {ours.nearest:.1e} from the axis"
     margin, bound, wrong = theirs.margin, theirs.bound, []

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import sealag
 from oracle.black_box.body import Body
 from oracle.black_box.design import Design, read_design
-from oracle.black_box.law import Law, TankLaw, derivative
+from oracle.black_box.law import Law, TankLaw, Unsettled, derivative
 from oracle.black_box.roots import Late, first_crossing, roots, unstable_count
 
 MOST_STEPS = 60
@@ -17,7 +18,9 @@ NOISE = 1e-8
 LONGEST_STEP = 0.2
 """rad, m: of one Newton step towards the equilibrium."""
 KNIFE_EDGE = 1e-7
-"""|Re s| / (1 + |s|) below which rounding decides on which side of the axis a root is."""
+"""|Re s| / (1 + |s|) below which rounding may decide on which side of the axis a root is."""
+ON_AXIS = 1e-11
+"""|Re s| / (1 + |s|) below which a root is on the axis: nothing there is asymptotically stable."""
 
 
 class NoEquilibrium(RuntimeError):
@@ -117,6 +120,11 @@ class Answer:
         """Whether no root is so near to the axis that rounding decides."""
         return self.nearest > KNIFE_EDGE
 
+    @property
+    def on_axis(self) -> bool:
+        """Whether a root lies on the axis to rounding."""
+        return self.nearest < ON_AXIS
+
 
 class BlackBox:
     """One design at one posture with one set of contacts."""
@@ -156,27 +164,65 @@ class BlackBox:
         body, K = self.body, self.drive.K
         q = self.posture
         _, places = body.held(q)
-        basis = body.free(q)
-        rank = body.nv - basis.shape[1]
+        rank = body.nv - body.free(q).shape[1]
         theta = q[body.nq - body.n :] + self.law.command(q, q[body.nq - body.n :]) / K
         if start is not None:
             q, theta = start
+        for attempt in (self._newton, self._downhill):
+            found, left = attempt(q, theta, places, rank)
+            if found is not None:
+                q_j = found[0][body.nq - body.n :]
+                away = np.abs(q_j - self.posture[body.nq - body.n :]).max()
+                return Rest(
+                    q=found[0], theta=found[1], sag=float(away), torque=K * (found[1] - q_j)
+                )
+        raise NoEquilibrium(f"residual {left:.2g} of the largest torque")
+
+    def _newton(self, q, theta, places, rank):
+        """Equilibrium (q, θ) by Newton's method, None if it does not arrive; the least residual."""
         left: list[float] = []
         for _ in range(MOST_STEPS):
-            Z = body.free(q, rank)
+            Z = self.body.free(q, rank)
             residual, size = self._unbalance(q, theta, Z)
             left.append(float(np.abs(residual).max()) / size)
             if left[-1] < BALANCED or (left[-1] < NOISE and min(left[:-1], default=1.0) < NOISE):
-                q_j = q[body.nq - body.n :]
-                away = np.abs(q_j - self.posture[body.nq - body.n :]).max()
-                return Rest(q=q, theta=theta, sag=float(away), torque=K * (theta - q_j))
-            slope = self._unbalance_slope(q, theta, Z)
-            step = -np.linalg.lstsq(slope, residual, rcond=1e-9)[0]
+                return (q, theta), left[-1]
+            step = -np.linalg.lstsq(self._unbalance_slope(q, theta, Z), residual, rcond=1e-9)[0]
             step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
             k = Z.shape[1]
-            q = body.touch(body.move(q, Z @ step[:k]), places)
+            q = self.body.touch(self.body.move(q, Z @ step[:k]), places)
             theta = theta + step[k:]
-        raise NoEquilibrium(f"residual {min(left):.2g} of the largest torque")
+        return None, min(left)
+
+    def _downhill(self, q, theta, places, rank):
+        """The same after a search that only goes where the residual falls."""
+        damping, left = 1e-3, np.inf
+        for _ in range(MOST_STEPS):
+            Z = self.body.free(q, rank)
+            residual, size = self._unbalance(q, theta, Z)
+            left = float(np.abs(residual).max()) / size
+            if left < 1e-6:
+                return self._newton(q, theta, places, rank)
+            J = self._unbalance_slope(q, theta, Z)
+            k, scale = Z.shape[1], np.maximum(np.linalg.norm(J, axis=0), 1e-6)
+            for _ in range(12):
+                system = np.vstack([J, np.diag(np.sqrt(damping) * scale)])
+                target = np.concatenate([-residual, np.zeros(J.shape[1])])
+                step = np.linalg.lstsq(system, target, rcond=None)[0]
+                step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+                there = self.body.touch(self.body.move(q, Z @ step[:k]), places)
+                try:
+                    new, _ = self._unbalance(there, theta + step[k:], self.body.free(there, rank))
+                    better = np.linalg.norm(new) < np.linalg.norm(residual)
+                except (Unsettled, sealag.SealagError):
+                    better = False
+                if better:
+                    q, theta, damping = there, theta + step[k:], damping / 5.0
+                    break
+                damping *= 5.0
+            else:
+                break
+        return None, left
 
     def _unbalance(self, q, theta, Z) -> tuple[np.ndarray, float]:
         body = self.body

@@ -50,7 +50,7 @@ def deviation(
         return d.K * (theta - q[place]) + d.D_s * (omega - v[body.base :])
 
     def slope(q: np.ndarray, x: np.ndarray, u: np.ndarray, fed: np.ndarray | None) -> np.ndarray:
-        v, theta, omega, torque = np.split(x, cuts)
+        v, _, omega, torque = np.split(x, cuts)
         spring = spring_of(q, x)
         force = -body.gravity(q) - body.damping @ v
         force[body.base :] += spring
