@@ -197,7 +197,7 @@ class BlackBox:
     def _downhill(self, q, theta, places, rank):
         """The same after a search that only goes where the residual falls."""
         damping, left = 1e-3, np.inf
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_STEPS // 3):
             Z = self.body.free(q, rank)
             residual, size = self._unbalance(q, theta, Z)
             left = float(np.abs(residual).max()) / size
@@ -235,16 +235,16 @@ class BlackBox:
         return np.concatenate([Z.T @ pull, command - spring]), size
 
     def _unbalance_slope(self, q, theta, Z) -> np.ndarray:
-        """A rough Jacobian of the residual; Newton's method corrects it."""
-        h, k = 1e-5, Z.shape[1]
+        """A rough Jacobian of the residual by forward differences; Newton's method corrects it."""
+        h, k = 1e-6, Z.shape[1]
 
         def at(step: np.ndarray) -> np.ndarray:
             there = self.body.move(q, Z @ step[:k])
-            Z_there = self.body.free(there, self.body.nv - k) if k else Z
-            Z_there = Z_there @ (Z_there.T @ Z)
-            return self._unbalance(there, theta + step[k:], Z_there)[0]
+            Z_there = self.body.free(there, self.body.nv - k)
+            return self._unbalance(there, theta + step[k:], Z_there @ (Z_there.T @ Z))[0]
 
-        columns = [(at(h * e) - at(-h * e)) / (2.0 * h) for e in np.eye(k + self.body.n)]
+        now = self._unbalance(q, theta, Z)[0]
+        columns = [(at(h * e) - now) / h for e in np.eye(k + self.body.n)]
         return np.stack(columns, axis=1)
 
     def loop(self, rest: Rest) -> Loop:
