@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+import sealag
 from oracle.black_box.body import Body
 from sealag.whole_body import Measurement
 
@@ -16,7 +17,7 @@ SETTLED = 3e-15
 """Relative change of a command that counts as none."""
 ROUNDING = 1e-8
 """Relative change below which a command that comes no nearer is at its rounding."""
-STEPS = (1e-3, 1e-4, 1e-5)
+STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
 """rad, m: largest steps of the difference quotients, tried until they agree to SMOOTH."""
 SMOOTH = 1e-9
 
@@ -172,14 +173,20 @@ def derivative(f: Callable[[np.ndarray], np.ndarray], size: int) -> np.ndarray:
     Raises:
         Unsettled: difference quotients of no step width agree.
     """
-    best, closest = None, np.inf
+    best, closest, lost = None, np.inf, None
     for width in STEPS:
-        D, gap = _extrapolated(f, size, width)
+        try:
+            D, gap = _extrapolated(f, size, width)
+        except (Unsettled, sealag.SealagError) as error:
+            lost = error  # the law exists only nearer to its equilibrium
+            continue
         gap = gap / max(float(np.abs(D).max()), 1e-6)
         if gap < closest:
             best, closest = D, gap
         if closest < SMOOTH:
             break
+    if best is None and lost is not None:
+        raise lost
     if best is None or closest > 1e-5:
         raise Unsettled(f"difference quotients disagree by {closest:.1g} of the derivative")
     return best

@@ -159,24 +159,37 @@ class BlackBox:
             start: q and θ to begin with instead; without contacts only.
 
         Raises:
-            NoEquilibrium: Newton's method finds none.
+            NoEquilibrium: none is found.
+            Unsettled, SealagError: the law does not exist there.
         """
         body, K = self.body, self.drive.K
-        q = self.posture
-        _, places = body.held(q)
-        rank = body.nv - body.free(q).shape[1]
-        theta = q[body.nq - body.n :] + self.law.command(q, q[body.nq - body.n :]) / K
-        if start is not None:
-            q, theta = start
+        _, places = body.held(self.posture)
+        rank = body.nv - body.free(self.posture).shape[1]
+        starts = self._starts() if start is None else [start]
+        left, lost = np.inf, None
         for attempt in (self._newton, self._downhill):
-            found, left = attempt(q, theta, places, rank)
-            if found is not None:
-                q_j = found[0][body.nq - body.n :]
-                away = np.abs(q_j - self.posture[body.nq - body.n :]).max()
-                return Rest(
-                    q=found[0], theta=found[1], sag=float(away), torque=K * (found[1] - q_j)
-                )
+            for q, theta in starts:
+                try:
+                    found, residual = attempt(q, theta, places, rank)
+                except (Unsettled, sealag.SealagError) as error:
+                    lost = error  # the law does not exist on the way; it may from elsewhere
+                    continue
+                left = min(left, residual)
+                if found is not None:
+                    q_j = found[0][body.nq - body.n :]
+                    away = np.abs(q_j - self.posture[body.nq - body.n :]).max()
+                    torque = K * (found[1] - q_j)
+                    return Rest(q=found[0], theta=found[1], sag=float(away), torque=torque)
+        if lost is not None and left == np.inf:
+            raise lost
         raise NoEquilibrium(f"residual {left:.2g} of the largest torque")
+
+    def _starts(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The posture with springs that carry it, and with springs at rest."""
+        body, q = self.body, self.posture
+        q_j, Z = q[body.nq - body.n :], body.free(q)
+        carry = np.linalg.lstsq(Z[body.base :].T, Z.T @ body.gravity(q), rcond=None)[0]
+        return [(q, q_j + carry / self.drive.K), (q, q_j)]
 
     def _newton(self, q, theta, places, rank):
         """Equilibrium (q, θ) by Newton's method, None if it does not arrive; the least residual."""
