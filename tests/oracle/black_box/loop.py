@@ -339,10 +339,21 @@ class BlackBox:
         onto[self.body.base : nv, : W.shape[1]] = W[self.body.base :]
         onto[nv:, W.shape[1] :] = np.eye(self.body.n)
         if not isinstance(self.law, TankLaw):
-            return (self.law.slope(rest.q, rest.theta) @ onto, None, 0.0), 0
+            slope = self.law.slope(rest.q, rest.theta)
+            self._require_blind_fall(rest, slope)
+            return (slope @ onto, None, 0.0), 0
         fast, slow, rate = self.law.slopes(rest.q, rest.theta)
+        self._require_blind_fall(rest, slow)
         fast, slow = fast @ onto, slow @ onto
         return (fast, slow, rate), int(np.linalg.matrix_rank(fast - slow, tol=1e-7))
+
+    def _require_blind_fall(self, rest: Rest, slope: np.ndarray) -> None:
+        """A robot without contacts falls; a law that feels the height has no rest."""
+        if self.body.falls_freely:
+            height = self.body.symmetries(rest.q)[:, 2]
+            felt = np.abs(slope[:, : self.body.nv] @ height).max()
+            if felt > 1e-7 * max(float(np.abs(slope).max()), 1e-9):
+                raise NoEquilibrium(f"the robot falls, and the law answers by {felt:.2g} Nm/m")
 
     def answer(self, rest: Rest | None = None) -> Answer:
         """Return what there is to say about the design.
