@@ -70,12 +70,12 @@ class Audit:
         tank: The energy tank's part of it (N,); None without a tank.
         delay_storage: V_4 (N,) with the multiplier of the design's certificate; None if nothing
             certifies the run's design.
-        delay_storage_error: Bound of its error (N,), J; None like it.
+        delay_storage_error: Bound of its error, J; None like it.
         delay_injection: ∫(τ_osc − τ_now)ᵀθ̇ (N,): the energy that delay, sampling and losses have
             put into the robot; None if the controller does not state its undelayed command.
         law_injection: ∫τ_nowᵀθ̇ + V_3 − V_3(0) (N,): what the undelayed law has given besides its
             potential; None like ``delay_injection``.
-        injection_error: Bound of the error of both (N,), J; None like them.
+        injection_error: Bound of the error of both, J; None like them.
         joint_side: Passivity of springs, motors, links and contacts (S_j).
         controller_side: Passivity of controller and delay (S_c); None if the controller states
             no storage function.
@@ -93,10 +93,10 @@ class Audit:
     controller_storage: Array | None
     tank: Array | None
     delay_storage: Array | None
-    delay_storage_error: Array | None
+    delay_storage_error: float | None
     delay_injection: Array | None
     law_injection: Array | None
-    injection_error: Array | None
+    injection_error: float | None
     joint_side: Passivity
     controller_side: Passivity | None
     delay_side: Passivity | None
@@ -123,13 +123,13 @@ class Stated:
         storage: V_3 and the tank's energy (N,), J.
         tank: The tank's energy (N,), J; None without a tank.
         work: ∫τ_now dθ of the undelayed command per joint (N, n), J.
-        rough: Bound of the error of its sum (N,), J.
+        rough: Bound of the error of its sum, J.
     """
 
     storage: Array
     tank: Array | None
     work: Array
-    rough: Array
+    rough: float
 
 
 @dataclass(slots=True)
@@ -211,10 +211,9 @@ def audit(
         injection = late.sum(axis=1)
         own = stated.work.sum(axis=1) + stated.storage - stated.storage[:1]
         damped = flows["damping"].sum(axis=1)
-        rough = float(stated.rough[-1]) if time.size else 0.0
         control = _observe(time, damped - injection - own, drive, joints, tolerance)
         delay = _observe(
-            time, damped - injection, late - flows["damping"], joints, tolerance + rough
+            time, damped - injection, late - flows["damping"], joints, tolerance + stated.rough
         )
     return Audit(
         time=time,
