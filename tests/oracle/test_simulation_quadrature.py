@@ -18,7 +18,7 @@ COULOMB = np.array([0.11, 0.07, 0.05])
 
 
 class Pendulums:
-    """τ = −∂V/∂θ of V = Σ k (1 − cos(θ − a)) + ½ c (θ_1 − θ_2)², and a part that has no potential."""
+    """τ = −∂V/∂θ of V = Σ k (1 − cos(θ − a)) + ½ c (θ_1 − θ_2)², and a part without potential."""
 
     k, a, c = np.array([30.0, 20.0, 12.0]), np.array([0.2, -0.1, 0.4]), 6.0
 
@@ -34,12 +34,13 @@ class Pendulums:
     def command(self, theta, q):
         tau = -self.k * np.sin(theta - self.a)
         tau[:2] -= self.c * (theta[0] - theta[1]) * np.array([1.0, -1.0])
-        return tau + self.curl * np.array([q[1] * theta[2], -q[2] ** 2, q[0]])
+        return tau + self.curl * np.array([q[1] * theta[2], -(q[2] ** 2), q[0]])
 
     def storage(self, t, measurement, command):
         self.tick(t, measurement, command)
         theta = measurement.theta
-        return float(self.k @ (1 - np.cos(theta - self.a)) + self.c / 2 * (theta[0] - theta[1]) ** 2)
+        coupling = self.c / 2 * (theta[0] - theta[1]) ** 2
+        return float(self.k @ (1 - np.cos(theta - self.a)) + coupling)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +70,7 @@ def _run(arm, log, curl=0.0, fine=FINE):
     )
     q = np.array([0.5, -0.4, 0.3])
     return closed_loop(
-        robot, springs, Pendulums(curl), q=q, theta=q + [0.05, 0.02, -0.03],
+        robot, springs, Pendulums(curl), q=q, theta=q + np.array([0.05, 0.02, -0.03]),
         v=np.array([1.0, -2.0, 0.5]), duration=DURATION,
         clock=Clock(physics=fine, central=PERIOD), network=network, log_period=log,
         scene=Scene(
@@ -129,7 +130,7 @@ def test_the_statement_does_not_depend_on_the_log(arm):
         )
 
 
-def test_what_the_delay_stores(runs, arm):
+def test_what_the_delay_stores(runs):
     """V_4 of a delay that no period divides, against its double integral; and the tolerance."""
     coarse, fine = runs[0.0]
     Y, delay = np.diag([3.0, 2.0, 1.0]) + 0.3, 0.0333
@@ -153,7 +154,7 @@ def test_what_the_delay_stores(runs, arm):
 
 def test_works_of_every_mechanism(runs, arm):
     """Per joint, so that an entry of another joint, or B for B_s, would be seen."""
-    robot, springs = arm
+    springs = arm[1]
     coarse, fine = runs[3.0]
     audit, D_s = coarse.audit, springs.spring_damping
     rate, link = fine.theta_dot, fine.v

@@ -13,7 +13,8 @@ COLUMNS = (
 
 
 def parameters(**changes):
-    values = dict(zip(COLUMNS, (350.0, 0.5, 0.093, 2.0, 100.0, 0.2, 0.0, np.inf, np.inf, np.inf, 0.0)))
+    ideal = (np.inf,) * 3
+    values = dict(zip(COLUMNS, (350.0, 0.5, 0.093, 2.0, 100.0, 0.2, 0.0, *ideal, 0.0)))
     return np.array([[{**values, **changes}[name] for name in COLUMNS]])
 
 

@@ -1,4 +1,4 @@
-"""No age in any run exceeds d_1, constant delays attain it exactly, and a network is its delays'."""
+"""No age in any run exceeds d_1, and constant delays attain it exactly."""
 
 import numpy as np
 import pytest
@@ -200,6 +200,7 @@ def test_a_run_hardly_depends_on_whether_its_steps_divide_its_delays(tmp_path):
 
 def test_delayed_torque_feedback_is_late_by_its_way_up(tmp_path):
     """Second order in the step: no step is added to its way up."""
+
     def end(physics, way):
         none = Link(delay=Constant(0.0))
         delays = Delays(
@@ -215,4 +216,3 @@ def test_delayed_torque_feedback_is_late_by_its_way_up(tmp_path):
     print(errors)
     assert errors[0] / errors[1] > 3
     assert abs(end(CENTRAL / 64, 3e-3 + CENTRAL / 8) - fine) > 4 * errors[1]
-

@@ -149,25 +149,26 @@ class UndelayedWork:
     command: Array = field(init=False)
     work: Array = field(init=False)
     rough: float = field(init=False, default=0.0)
-    _last: list[tuple[Array, Array, float]] = field(init=False, default_factory=list)
+    _last: list[tuple[Array, Array]] = field(init=False, default_factory=list)
+    _done: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
         self.command, self.work = np.zeros(self.n), np.zeros(self.n)
 
     def move(self, theta: Array) -> None:
         """Take the motor angles (n,) at which ``command`` holds."""
-        here, done = (theta.copy(), self.command.copy()), 0.0
+        here, before = (theta.copy(), self.command.copy()), self._done
         if self._last:
             gained = _trapezoid(self._last[-1], here)
             self.work += gained
-            done = float(gained.sum())
+            self._done = float(gained.sum())
         if len(self._last) == 2:
             both = float(_trapezoid(self._last[0], here).sum())
-            self.rough += 0.5 * abs(both - self._last[1][2] - done)
-        self._last = [*self._last[-1:], (*here, done)]
+            self.rough += 0.5 * abs(both - before - self._done)
+        self._last = [*self._last[-1:], here]
 
 
-def _trapezoid(start: tuple[Array, ...], end: tuple[Array, ...]) -> Array:
+def _trapezoid(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
     return 0.5 * (start[1] + end[1]) * (end[0] - start[0])
 
 

@@ -29,10 +29,8 @@ def delay_store(
     return stored, float(np.abs(stored - other).max())
 
 
-def _store(
-    time: Array, theta: Array, theta_dot: Array, Y: Array, delay: float, at: Array
-) -> Array:
-    """V_4 at instants (A,): with P = ∫p and PP = ∫P, ∫(ξ − t + d) p dξ = d P(t) − PP(t) + PP(t−d)."""
+def _store(time: Array, theta: Array, theta_dot: Array, Y: Array, delay: float, at: Array) -> Array:
+    """V_4 at instants (A,): ∫(ξ − t + d) p dξ = d P(t) − PP(t) + PP(t − d), P = ∫p, PP = ∫P."""
     step = np.diff(time)
     whole = _integrals(theta, theta_dot, Y, np.arange(len(step)), step, step)
     P = np.concatenate([[0.0], np.cumsum(whole[0])])

@@ -84,7 +84,7 @@ class Clock:
     def __post_init__(self) -> None:
         for name in ("physics", "embedded", "central"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and (value > 0 or name == "embedded" and value == 0)):
+            if not (math.isfinite(value) and (value > 0 or (name == "embedded" and value == 0))):
                 raise InputError(f"the {name} period must be a time > 0 s, got {value}")
         central = self.steps_of("central", self.central)
         if self.embedded and central % self.steps_of("embedded", self.embedded):
