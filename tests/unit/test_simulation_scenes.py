@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from helpers.chains import wheel
+from helpers.chains import chain, wheel
 from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD
 from sealag.actuation import actuators
@@ -174,6 +174,19 @@ class TestRefused:
             require_hold(
                 hume, _posture(hume, clearance=0.1), torque_limit=np.full(6, 100.0), **options
             )
+
+
+    def test_the_weak_joint_is_named_and_not_the_loaded_one(self, tmp_path):
+        """Two links held out: 9.81 (0.5 + 1) Nm and 9.81 * 0.5 Nm."""
+        arm = chain(tmp_path, count=2, along="x")
+        options = {"ground": FlatGround(), "feet": []}
+        limit = np.array([16.0, 4.0])
+        with pytest.raises(InputError, match=r"joint joint1 needs at least 4.91 Nm and has 4 Nm"):
+            require_hold(arm, np.zeros(2), torque_limit=limit, **options)
+        with pytest.raises(InputError, match=r"joint joint0 needs at least 14.7 Nm and has 14 Nm"):
+            require_hold(arm, np.zeros(2), torque_limit=np.array([14.0, 5.0]), **options)
+        hold = require_hold(arm, np.zeros(2), torque_limit=np.array([16.0, 5.0]), **options)
+        np.testing.assert_allclose(np.abs(hold.torque), 9.81 * np.array([1.5, 0.5]))
 
 
 class TestNamedEnds:

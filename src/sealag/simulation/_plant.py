@@ -433,5 +433,6 @@ def fastest_link(robot: Robot, actuators: Actuators, q: Array) -> tuple[float, s
     A = np.block([[O, np.diag(root)], [-mobility * root, -mobility * damping]])
     values, modes = np.linalg.eig(A)
     fastest = int(np.abs(values).argmax())
-    moved = np.abs(modes[n:, fastest])
-    return float(np.abs(values[fastest])), robot.joints[int(moved.argmax())]
+    rate, mode = float(np.abs(values[fastest])), np.abs(modes[:, fastest]) ** 2
+    taken = mode[:n] + damping * mode[n:] / rate  # energy that spring and dampers take
+    return rate, robot.joints[int(taken.argmax())]
