@@ -127,7 +127,7 @@ class TestStiffDamping:
         controller = JointPD(fast, stiffness=200.0, motor=True)
         with (
             warnings.catch_warnings(),
-            pytest.raises(InputError, match="step of .* ms is too long"),
+            pytest.raises(InputError, match=r"step of .* ms is too long"),
         ):
             warnings.simplefilter("ignore")
             closed_loop(robot, springs, controller,

@@ -175,7 +175,6 @@ class TestRefused:
                 hume, _posture(hume, clearance=0.1), torque_limit=np.full(6, 100.0), **options
             )
 
-
     def test_the_weak_joint_is_named_and_not_the_loaded_one(self, tmp_path):
         """Two links held out: 9.81 (0.5 + 1) Nm and 9.81 * 0.5 Nm."""
         arm = chain(tmp_path, count=2, along="x")

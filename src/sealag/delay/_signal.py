@@ -72,7 +72,7 @@ class Constant:
 
     @property
     def steepest_fall(self) -> float:
-        """0."""
+        """0 s/s: it never falls."""
         return 0.0
 
     @property

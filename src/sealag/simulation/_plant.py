@@ -272,7 +272,7 @@ class Plant:
         )  # fmt: skip
         if not solved:
             raise self._unsolvable(self._stage, following)
-        if not math.isfinite(following.power[4]):
+        if not math.isfinite(following.energy[0]):
             raise PlantStop(
                 Outcome.DIVERGED, f"velocities are not finite after t = {self.time:.4f} s"
             )
