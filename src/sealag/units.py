@@ -7,6 +7,9 @@ from sealag.errors import InputError
 LONGEST_DELAY_S = 5.0
 """A longer network delay than this is taken for a mistaken unit, not for a robot."""
 
+_UNITS = ((1e9, "ns"), (1e6, "us"), (1e3, "ms"))
+"""Factor from s and name of the units below it."""
+
 
 def seconds_from_ms(value_ms: float) -> float:
     """Convert milliseconds to seconds.
@@ -18,6 +21,45 @@ def seconds_from_ms(value_ms: float) -> float:
         The time in s.
     """
     return value_ms * 1e-3
+
+
+def time_text(value_s: float | None) -> str:
+    """Write a time for a person: in ns, us, ms or s, with the digits that say something.
+
+    Args:
+        value_s: s; inf for a time that no delay reaches, None for one that is not known.
+    """
+    if value_s is None or math.isnan(value_s):
+        return "not known"
+    if math.isinf(value_s):
+        return "unbounded"
+    if value_s == 0.0:
+        return "0 ms"
+    factor, unit = 1.0, "s"
+    for smaller, name in _UNITS:
+        if round(abs(value_s) * smaller, 3) < 1000.0:
+            factor, unit = smaller, name
+            break
+    number = value_s * factor
+    digits = f"{number:.3f}" if 0.1 <= abs(number) < 1e7 else f"{number:.4g}"
+    return f"{digits} {unit}"
+
+
+def number_of(text: str) -> float | None:
+    """Return the number that a cell of a text file holds; None if it holds none.
+
+    Digits are 0 to 9 and nothing stands between them: Python's own reading takes 0_3 and digits of
+    other scripts for numbers.
+
+    Args:
+        text: the cell.
+    """
+    if not text.isascii() or "_" in text:
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 def check_delay_s(value_s: float, name: str) -> float:

@@ -74,9 +74,11 @@ def _moving() -> Any:
 
 
 def without_loop(data: dict[str, Any]) -> dict[str, Any]:
-    """The same without any claim about the frozen loop."""
+    """The same without any claim about the frozen loop, the margins or stability."""
     nothing = ("local_loop", "local_margin_s", "first_crossing_s", "stable", "conservatism")
-    return {**data, **dict.fromkeys(nothing), "unstable_modes": 0}
+    count = data["instants"]
+    open_ = {"instant_margins_s": [None] * count, "instant_basis": ["open"] * count}
+    return {**data, **dict.fromkeys(nothing), **open_, "unstable_modes": 0}
 
 
 def resealed(data: dict[str, Any]) -> dict[str, Any]:

@@ -110,7 +110,7 @@ def model_xml(
             for axis in np.eye(3)
         )
     base = [i for i in range(1, model.njoints) if model.parents[i] == 0]
-    bearing = dict(zip(robot.joints, getattr(robot, "damping", np.zeros(robot.n)).tolist()))
+    bearing = dict(zip(robot.joints, robot.damping.tolist()))
     bodies = "".join(_body(model, i, sites, robot.floating_base, bearing) for i in base)
     rotors = "".join(
         f'<body name="rotor_{name}" pos="0 0 50"><inertial pos="0 0 0" mass="1e-6" '

@@ -102,3 +102,38 @@ def test_gravity_torque_is_pinocchio_s(instant):
     at = robot.workspace()
     at.update(q, v)
     close(at.gravity(), pin.computeGeneralizedGravity(robot._model, data, q))
+
+
+def test_gravity_gradient_is_pinocchio_s(instant):
+    """Among the base's own directions its symmetric part."""
+    robot, q, _, terms, data = instant
+    H = np.full((robot.nv, robot.nv), np.nan)
+    dynamics.gravity_gradient(robot.tree, terms, H)
+    expected = pin.computeGeneralizedGravityDerivatives(robot._model, data, q)
+    base = robot.nv_base
+    expected[:base, :base] = 0.5 * (expected[:base, :base] + expected[:base, :base].T)
+    close(H, expected)
+    np.testing.assert_array_equal(H, H.T)
+
+
+def plain_gravity_gradient(robot, q):
+    """Differences of the gravity torque, by each coordinate."""
+    step, columns = 1e-5, []
+    for direction in np.eye(robot.nv):
+        ahead = robot.gravity(robot.integrate(q, step * direction))
+        back = robot.gravity(robot.integrate(q, -step * direction))
+        columns.append((ahead - back) / (2.0 * step))
+    H = np.array(columns).T
+    base = robot.nv_base
+    H[:base, :base] = 0.5 * (H[:base, :base] + H[:base, :base].T)
+    return H
+
+
+def test_gravity_gradient_is_that_of_its_plain_twin(instant):
+    robot, q, _, _, _ = instant
+    twin = plain_gravity_gradient(robot, q)
+    np.testing.assert_allclose(
+        robot.gravity_gradient(q), twin, atol=1e-7 * max(1.0, np.abs(twin).max())
+    )
+    elsewhere = robot.integrate(q, 0.1 * np.ones(robot.nv))
+    assert np.abs(robot.gravity_gradient(elsewhere) - twin).max() > 1e-3  # negative control

@@ -1,6 +1,6 @@
 """Series elastic actuators with their embedded controller, and how transparent they are."""
 
-from sealag.actuation._actuators import Actuators, actuators, joint_values
+from sealag.actuation._actuators import Actuators, actuators, joint_values, motor_parameters
 from sealag.actuation._transparency import (
     Transparency,
     deviation_rms,
@@ -14,6 +14,7 @@ __all__ = [
     "actuators",
     "deviation_rms",
     "joint_values",
+    "motor_parameters",
     "torque_transfer",
     "transparency",
 ]

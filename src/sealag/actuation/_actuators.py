@@ -77,7 +77,7 @@ def actuators(
         spring_damping: D_s, Nms/rad.
         coulomb_friction: Nm.
         viscous_friction: Nms/rad.
-        torque_limit: Nm, positive, inf for none.
+        torque_limit: Nm, inf for none; a motor with 0 gives nothing.
         velocity_limit: rad/s, positive, inf for none.
         torque_bandwidth: rad/s, positive, inf for an ideal torque loop.
 
@@ -100,7 +100,7 @@ def actuators(
         spring_damping=take("spring_damping", spring_damping, positive=False),
         coulomb_friction=take("coulomb_friction", coulomb_friction, positive=False),
         viscous_friction=take("viscous_friction", viscous_friction, positive=False),
-        torque_limit=take("torque_limit", torque_limit, positive=True, finite=False),
+        torque_limit=take("torque_limit", torque_limit, positive=False, finite=False),
         velocity_limit=take("velocity_limit", velocity_limit, positive=True, finite=False),
         torque_bandwidth=take("torque_bandwidth", torque_bandwidth, positive=True, finite=False),
     )
@@ -137,3 +137,26 @@ def joint_values(
         need = "positive" if positive else "0 or positive"
         raise InputError(f"{name} of joint {joints[at]} is {array[at]:g}; it must be {need}.")
     return np.array(array)
+
+
+def motor_parameters(actuators: Actuators, joint_damping: ArrayLike = 0.0) -> Array:
+    """Return the joints as the motor kernels take them, (n, 11).
+
+    Args:
+        actuators: springs, motors and drives.
+        joint_damping: (n,) or one number, of the links' side, Nms/rad.
+    """
+    columns = [
+        actuators.spring_stiffness,
+        actuators.spring_damping,
+        actuators.rotor_inertia,
+        actuators.rotor_inertia / actuators.shaped_inertia,
+        actuators.motor_damping,
+        actuators.viscous_friction,
+        actuators.coulomb_friction,
+        actuators.torque_limit,
+        actuators.velocity_limit,
+        actuators.torque_bandwidth,
+        np.broadcast_to(joint_damping, actuators.n),
+    ]
+    return np.ascontiguousarray(np.stack(columns, axis=1), dtype=float)

@@ -7,15 +7,13 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sealag.cli._app import show_json
 from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
-from sealag.errors import FileError, InputError
+from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import check_output, make_folder, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
-from sealag.units import seconds_from_ms
+from sealag.units import seconds_from_ms, time_text
 
 LONGEST_HORIZON_MS = 1e6
 LARGEST_LIST = 250
@@ -35,6 +33,19 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     text = starter_project(urdf, floating_base=floating_base, named=named)
     write_text(path, text)
     return path
+
+
+def compile_kernels() -> None:
+    """Compile what is not in the cache yet, and say so: it takes minutes after an installation."""
+    from sealag.kernels import compile_all, compiled
+
+    if compiled():
+        return
+    print("sealag: compiling its kernels, once after the installation (minutes)", file=sys.stderr)
+    compile_all(
+        lambda name: print(f"sealag: compiling {name}", file=sys.stderr, flush=True),
+        missing_only=True,
+    )
 
 
 @contextmanager
@@ -70,6 +81,7 @@ def certify_project(
     path = out or Path(f"{resolve_project(project).stem}.certificate.json")
     system = load(project)
     check_output(path, *system.files, *([motion] if motion else []))
+    compile_kernels()
     with _busy("certifying"):
         certificate = certify(
             system,
@@ -86,48 +98,40 @@ def certify_project(
     return 0 if certificate.status is Status.CERTIFIED else 1
 
 
-def _ms(seconds: float | None) -> str:
-    if seconds is None:
-        return "-"
-    return f"{seconds * 1e3:.3f} ms" if np.isfinite(seconds) else "any"
-
-
 def _stability(certificate: Certificate) -> str:
-    """What is known of stability at the worst instant, which a passive loop need not have."""
+    """What is known of stability without delay, which a passive loop need not have."""
     if certificate.unstable_modes:
         count = certificate.unstable_modes
-        return f"no: {count} root{'s' * (count > 1)} unstable without delay (passive is not stable)"
+        return f"no: {count} root{'s' * (count > 1)} unstable without delay"
     if certificate.stable is None:
-        known = certificate.local_loop is not None
-        return "without delay yes: no unstable root" if known else "not known"
-    return "yes" if certificate.stable else "no: the potential has no minimum"
+        return "not known"
+    return "yes" if certificate.stable else "no"
 
 
 def _show_certificate(certificate: Certificate, path: Path) -> None:
     worst = certificate.worst
     shares = sorted(worst.direction.items(), key=lambda item: -item[1])
     limiting = ", ".join(f"{name} {share:.0%}" for name, share in shares[:3] if share >= 0.01)
-    crossing = certificate.first_crossing_s
     verdict = certificate.status.value.replace("_", " ")
     rows = [
         ("verdict", f"{verdict} ({certificate.criterion} criterion)"),
         ("stable", _stability(certificate)),
-        ("largest delay", _ms(certificate.max_delay_s)),
-        ("delay of the design", _ms(certificate.delay_s)),
+        ("largest delay", time_text(certificate.max_delay_s)),
+        ("delay of the design", time_text(certificate.delay_s)),
         (
             "worst instant",
             f"{worst.instant} of {certificate.instants}, at {worst.time_s:.3f} s",
         ),
-        ("gives in first", limiting),
-        ("exact local margin there", _ms(certificate.local_margin_s)),
-        ("first crossing there", _ms(crossing)),
-        ("published criterion says", _ms(certificate.published_max_delay_s)),
+        ("limiting joints", limiting),
+        ("exact local margin", time_text(certificate.local_margin_s)),
+        ("first crossing", time_text(certificate.first_crossing_s)),
+        ("published criterion says", time_text(certificate.published_max_delay_s)),
         ("certificate", str(path)),
     ]
     if certificate.common_multiplier_delay_s is not None:
-        rows.insert(3, ("with one multiplier", _ms(certificate.common_multiplier_delay_s)))
+        rows.insert(3, ("with one multiplier", time_text(certificate.common_multiplier_delay_s)))
     if certificate.time_varying_delay_s is not None:
-        rows.insert(4, ("with matrices that move", _ms(certificate.time_varying_delay_s)))
+        rows.insert(4, ("with matrices that move", time_text(certificate.time_varying_delay_s)))
     for name, value in rows:
         print(f"{name:26} {value}")
     for reason in certificate.reasons:
@@ -135,7 +139,7 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
     for bound, reason in certificate.left_open.items():
         print(f"left open is a longer {bound}: {reason}")
     for assumption in certificate.assumptions:
-        print(f"assumes that {assumption}")
+        print(f"assumed: {assumption.text}")
 
 
 def margin_project(
@@ -151,14 +155,15 @@ def margin_project(
         )
     system = load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
+    compile_kernels()
     with _busy("computing margins"):
         found = local_margins(system, _motion(system, motion), horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)
         return
-    print(f"{'local margin':26} {_ms(found.delay_s)}")
-    print(f"{'first crossing':26} {_ms(found.first_crossing_s)}")
+    print(f"{'local margin':26} {time_text(found.delay_s)}")
+    print(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
     print(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
     print(f"{'unstable without delay':26} {found.unstable_modes} roots")
     print(f"{'neutral by symmetry':26} {found.neutral} roots")
@@ -166,16 +171,26 @@ def margin_project(
     mode = sorted(found.mode.items(), key=lambda item: -item[1])
     print(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
     for low, high, count in found.intervals:
-        print(f"{_ms(low):>14} to {_ms(high):14} {count} unstable roots")
+        print(f"{time_text(low):>14} to {time_text(high):14} {count} unstable roots")
 
 
 def verify_certificate(
-    path: Path, *, exact: bool, project: str | None, motion: Path | None, as_json: bool
+    path: Path,
+    *,
+    exact: bool,
+    second: bool,
+    project: str | None,
+    motion: Path | None,
+    as_json: bool,
 ) -> int:
     """Check a certificate, against its project if one is given; 1 if it does not hold."""
     from sealag.design import verify_design
     from sealag.passivity import verify
 
+    if second:
+        if exact or project is not None or motion is not None:
+            raise InputError("--second stands alone: it is exact and knows the file only.")
+        return _second(path, as_json=as_json)
     if project is None:
         if motion is not None:
             raise InputError("--motion says nothing without --project.")
@@ -196,6 +211,26 @@ def verify_certificate(
                 print(f"BAD  {check.name}: {check.detail}")
         print("the certificate holds" if result.valid else "the certificate does not hold")
     return 0 if result.valid else 1
+
+
+def _second(path: Path, *, as_json: bool) -> int:
+    """Show what the second verifier decides; 1 if a claim does not hold."""
+    from sealag.second_verifier import claims, read
+
+    found, words = [], {True: "holds", False: "does not hold", None: "cannot decide"}
+    try:
+        for name, holds, detail in claims(read(str(path))):
+            found.append({"name": name, "holds": holds, "detail": detail})
+            if not as_json:
+                print(f"{words[holds]:14} {name}: {detail}".rstrip(": "), flush=True)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise CertificateError(f"{path} is not a certificate: {error}.") from error
+    valid = all(one["holds"] is not False for one in found)
+    if as_json:
+        show_json({"valid": valid, "claims": found})
+    else:
+        print("no claim fails" if valid else "the certificate does not hold")
+    return 0 if valid else 1
 
 
 def write_paper(out: Path, *, as_json: bool) -> None:

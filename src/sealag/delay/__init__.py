@@ -9,6 +9,7 @@ from sealag.delay._signal import (
     Sinusoid,
     Table,
     measured,
+    share_left_out,
 )
 
 __all__ = [
@@ -23,4 +24,5 @@ __all__ = [
     "Sinusoid",
     "Table",
     "measured",
+    "share_left_out",
 ]

@@ -177,6 +177,14 @@ class Delays:
             drive += self.central.down.spread  # packets overtake that left together
         return down + drive + self.sample_time + 2.0 * self.embedded_period
 
+    @property
+    def torque_feedback_delay(self) -> float | None:
+        """Upper bound e of how late the drives' torque feedback is, s; None if it is immediate."""
+        if not self.delayed_torque_feedback:
+            return None
+        period = self.embedded_period or self.sample_time
+        return self.embedded.up.late_bound(period) + self.embedded_period
+
     def d_1_at(self, t: float | Array) -> float | Array:
         """Return the position feedback's total delay with its mean hold of half a period.
 

@@ -152,6 +152,7 @@ class Table:
     Attributes:
         time: (N,) s, increasing.
         delay: (N,) s.
+        left_out: share of the packets that are later than the table says; 0 if none is.
 
     Raises:
         InputError: lengths differ, time does not increase, or a delay cannot be one.
@@ -159,6 +160,7 @@ class Table:
 
     time: Array
     delay: Array
+    left_out: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the arrays."""
@@ -227,7 +229,22 @@ def measured(samples: ArrayLike, *, period: float, quantile: float = 1.0) -> Tab
     if not (math.isfinite(period) and period > 0.0) or not 0.0 < quantile <= 1.0:
         raise InputError("Measured delays need a positive period and a quantile in (0, 1].")
     cut = float(np.quantile(values, quantile)) if quantile < 1.0 else np.inf
-    return Table(time=np.arange(len(values)) * period, delay=np.minimum(values, cut))
+    return Table(
+        time=np.arange(len(values)) * period,
+        delay=np.minimum(values, cut),
+        left_out=float(np.mean(values > cut)),
+    )
+
+
+def share_left_out(signal: DelaySignal) -> float:
+    """Return the share of packets that a delay signal leaves out of its upper bound.
+
+    Args:
+        signal: any delay signal; only measured ones cut at a quantile leave packets out.
+    """
+    if isinstance(signal, Share):
+        return share_left_out(signal.signal)
+    return signal.left_out if isinstance(signal, Table) else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

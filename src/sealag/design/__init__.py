@@ -1,5 +1,6 @@
 """The user's project file, motions in and out, and the certificate of a design."""
 
+from sealag.design._assumptions import assumptions_of
 from sealag.design._certify import certify
 from sealag.design._criteria import (
     ASYMMETRY_TOLERANCE,
@@ -7,27 +8,32 @@ from sealag.design._criteria import (
     certified_bounds,
     published_bounds,
 )
+from sealag.design._local import Local, local_of, margin_of
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
 from sealag.design._project import load, resolve_project
 from sealag.design._recheck import verify_design
 from sealag.design._simulate import scenario_duration, simulate, walk_scene
 from sealag.design._starter import starter_project
-from sealag.design._system import System, Tank
+from sealag.design._system import Source, System
 from sealag.design._walking import Walking
 
 __all__ = [
     "ASYMMETRY_TOLERANCE",
     "Bounds",
+    "Local",
     "LocalMargins",
+    "Source",
     "System",
-    "Tank",
     "Walking",
+    "assumptions_of",
     "certified_bounds",
     "certify",
     "load",
     "load_motion",
     "local_margins",
+    "local_of",
+    "margin_of",
     "motion_table",
     "published_bounds",
     "resolve_project",

@@ -7,28 +7,37 @@ from typing import Any
 import numpy as np
 
 from sealag import __version__
+from sealag.design._assumptions import assumptions_of
 from sealag.design._criteria import Bounds, asymmetry, certified_bounds, published_bounds
 from sealag.design._evidence import (
     Common,
-    Local,
     Moving,
     common_multiplier,
-    frozen_loop,
     instant_proofs,
     moving_multiplier,
+    refuted_delay,
+    stated_loop,
     without,
+    without_bounds,
     worst_motion,
 )
+from sealag.design._local import Local, local_of
 from sealag.design._system import System
 from sealag.errors import InputError, either
-from sealag.passivity import Certificate, Criterion, Solver, Status, Worst
-from sealag.robot import Motion
-from sealag.whole_body import (
-    Feedback,
-    GravityCompensation,
-    TaskError,
-    WholeBodyStack,
+from sealag.passivity import (
+    Certificate,
+    Criterion,
+    Critical,
+    Rest,
+    Solver,
+    Status,
+    Worst,
 )
+from sealag.robot import Motion
+from sealag.typing import Array
+from sealag.units import time_text
+from sealag.whole_body import Rest as Equilibrium
+from sealag.whole_body import Spaces
 
 PROOF_COUNT = 12
 """Instants whose numbers a certificate holds if nothing else is asked for."""
@@ -44,6 +53,9 @@ def certify(
     solver: Solver | None = None,
 ) -> Certificate:
     """Certify how much delay a design tolerates at every instant of a motion.
+
+    Stability and local margin are decided over all instants, in the instant's configuration itself
+    and where the loop that holds it rests.
 
     Args:
         system: the design.
@@ -68,12 +80,14 @@ def certify(
         RobotError: a mass matrix is not positive definite.
         UnknownNameError: a frame or joint does not exist.
     """
-    motion = system.still() if motion is None else motion
     kind = _criterion(system, motion, criterion, time_varying=time_varying, proofs=proofs)
-    stack = system.evaluate(motion)
-    published = published_bounds(stack, system, solver=solver)
+    rest = system.rest() if motion is None else None
+    motion = system.still() if motion is None else motion
+    spaces = system.spaces(motion)
+    published = published_bounds(spaces, system, solver=solver)
     printed = kind is Criterion.PUBLISHED
-    bounds = published if printed else certified_bounds(stack, system)
+    passive = certified_bounds(spaces, system, rest)
+    bounds = published if printed else passive
     shared = not printed and len(motion) > 1 and not bounds.reasons
     common = common_multiplier(system, bounds, solver=solver) if shared else None
     moving = None
@@ -81,7 +95,7 @@ def certify(
         moving = moving_multiplier(system, motion, bounds, solver=solver)
     held, missing = instant_proofs(
         system,
-        stack,
+        spaces,
         bounds,
         kind=kind,
         count=proofs,
@@ -90,17 +104,26 @@ def certify(
     )
     if missing:
         bounds, common, moving = without(bounds, missing), None, None
-    local = frozen_loop(system, motion, stack, instant=int(np.argmin(bounds.delay)))
+    decided = passive if kind is Criterion.CERTIFIED else without_bounds(passive)
+    local = local_of(system, motion, spaces, decided)
     return Certificate(
         **_answer(
-            system, stack, bounds, kind=kind, local=local, open_=_left_open(system, common, moving)
+            system,
+            spaces,
+            bounds,
+            kind=kind,
+            local=local,
+            rest=rest,
+            open_=_left_open(system, common, moving),
         ),
         **_at_worst(system, motion, bounds, local),
+        **_over_motion(motion, local),
         **_shared(bounds, common, moving),
         **design_entries(system),
         instants=len(motion),
+        equilibrium=None if rest is None else Rest(found=rest.found, moved_rad=rest.moved),
         published_max_delay_s=float((bounds if printed else published).delay.min()),
-        assumptions=_assumptions(system, kind, motion, local),
+        assumptions=assumptions_of(system, motion, kind, local),
         time_s=motion.time.tolist(),
         bounds_s=bounds.delay.tolist(),
         proofs=held,
@@ -114,21 +137,21 @@ def certify(
 
 def _criterion(
     system: System,
-    motion: Motion,
+    motion: Motion | None,
     criterion: Criterion | str | None,
     *,
     time_varying: bool,
     proofs: int | None,
 ) -> Criterion:
     """The criterion that is asked for, if the question has an answer."""
-    if not isinstance(motion, Motion):
+    if not isinstance(motion, Motion | None):
         raise InputError(f"motion is {motion!r}; load_motion makes a Motion of a file.")
     if proofs is not None and not (isinstance(proofs, int) and proofs >= 1):
         raise InputError(f"proofs is {proofs!r}; it must be a whole number from 1 up, or None.")
     name = system.criterion if criterion is None else criterion
     if name not in set(Criterion):
         raise InputError(f"criterion is {name!r}; it must be {either(list(Criterion))}.")
-    if time_varying and (name == Criterion.PUBLISHED or len(motion) < 2):
+    if time_varying and (name == Criterion.PUBLISHED or motion is None or len(motion) < 2):
         raise InputError(
             "A time-varying bound needs the certified criterion and a motion of more than one "
             "instant (--motion)."
@@ -142,18 +165,31 @@ def design_entries(system: System) -> dict[str, Any]:
     Args:
         system: the design.
     """
+    law, drives = system.law, system.actuators
     return {
         "delay_s": system.delays.d_1,
-        "levels": system.hierarchy.levels(system.robot),
-        "feedback": system.feedback.value,
-        "gravity": system.gravity.value,
-        "stiffness_form": system.hierarchy.form.value,
-        "task_inertia": system.hierarchy.task_inertia.value,
+        "levels": law.levels(system.robot),
+        "feedback": law.signal.name,
+        "gravity": law.gravity.value,
+        "stiffness_form": law.stiffness_form.value,
+        "task_inertia": law.task_inertia.value,
         "joints": system.robot.joints,
-        "D_theta": system.actuators.motor_damping.tolist(),
-        "spring_stiffness": system.actuators.spring_stiffness.tolist(),
-        "hashes": {"urdf": system.robot.urdf_sha256, "project": system.sha256},
+        "D_theta": drives.motor_damping.tolist(),
+        "spring_stiffness": drives.spring_stiffness.tolist(),
+        "spring_damping": drives.spring_damping.tolist(),
+        "viscous_friction": drives.viscous_friction.tolist(),
+        "motor_inertia": drives.shaped_inertia.tolist(),
+        "rotor_inertia": drives.rotor_inertia.tolist(),
+        "torque_bandwidth": [_finite(value) for value in drives.torque_bandwidth],
+        "hashes": {
+            "urdf": system.robot.urdf_sha256,
+            "project": "" if system.source is None else system.source.sha256,
+        },
     }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _left_open(system: System, common: Common | None, moving: Moving | None) -> tuple[str, ...]:
@@ -168,11 +204,12 @@ def _left_open(system: System, common: Common | None, moving: Moving | None) -> 
 
 def _answer(
     system: System,
-    stack: WholeBodyStack,
+    spaces: Spaces,
     bounds: Bounds,
     *,
     kind: Criterion,
     local: Local,
+    rest: Equilibrium | None,
     open_: tuple[str, ...],
 ) -> dict[str, Any]:
     """Status with its reasons, and what decides it."""
@@ -182,33 +219,45 @@ def _answer(
     if not reasons and delay_s > max_delay_s:
         solver = f"; a longer one is open: {bounds.left_open}" if bounds.left_open else ""
         reasons.append(
-            f"the design's delay of {delay_s * 1e3:.3f} ms exceeds the bound of "
-            f"{max_delay_s * 1e3:.3f} ms{solver}"
+            f"the design's delay of {time_text(delay_s)} exceeds the bound of "
+            f"{time_text(max_delay_s)}{solver}"
         )
     reasons += open_
-    certified, margin = kind is Criterion.CERTIFIED, local.margin_s
-    if certified and not reasons and local.stable and margin is not None and margin < max_delay_s:
-        reasons.append(
-            f"the law that is run loses its stability at {margin * 1e3:.3f} ms, before its bound: "
-            "it also answers to passive motions of the base, which no bound covers"
-        )
+    if rest is not None and not rest.found:
+        reasons.append(f"the loop that holds the posture has no equilibrium: {rest.reason}")
+    if kind is Criterion.CERTIFIED and not reasons:
+        reasons += _undercut(local, bounds.delay)
     return {
         "status": Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
         "criterion": kind,
         "max_delay_s": max_delay_s,
-        "max_delay_upper_s": float(bounds.upper[worst]),
-        "asymmetry": float(np.max(asymmetry(stack, bounds, kind))),
-        "contraction": float(stack.contraction.max()),
+        "asymmetry": _finite(np.max(asymmetry(spaces, bounds, kind))),
+        "contraction": _finite(spaces.contraction.max()),
         "reasons": tuple(reasons),
     }
 
 
+def _undercut(local: Local, bounds: Array) -> list[str]:
+    """Where the law that runs loses a stability that it has, before its bound."""
+    lost = [k for k in local.undercut(bounds) if local.instants[k].delay > 0.0]
+    if not lost:
+        return []
+    k = min(lost, key=lambda at: local.instants[at].delay)
+    return [
+        f"the law that runs loses its stability at {time_text(local.instants[k].delay)} at instant "
+        f"{k}, before its bound of {time_text(float(bounds[k]))}: its matrices change where it "
+        "rests with an error, or it answers to motions of the base, and no bound covers that"
+    ]
+
+
 def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> dict[str, Any]:
-    """The worst instant: which, its limiting direction, and its frozen loop."""
+    """The instant of the smallest bound: which, and its limiting direction."""
     worst = int(np.argmin(bounds.delay))
     y = worst_motion(system, bounds, worst)
     power = system.actuators.motor_damping * np.abs(y) ** 2
-    margin, bound = local.margin_s, float(bounds.delay[worst])
+    margin, bound, upper = local.margin_s, float(bounds.delay[worst]), float(bounds.upper[worst])
+    if 0.0 < bound < np.inf:
+        upper = float(refuted_delay(system, bounds, worst, y)) * (1.0 + 1e-13)
     known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
     return {
         "worst": Worst(
@@ -216,13 +265,24 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
             time_s=float(motion.time[worst]),
             direction=dict(zip(system.robot.joints, (power / power.sum()).tolist(), strict=True)),
         ),
+        "max_delay_upper_s": upper,
         "worst_motion": [y.real.tolist(), y.imag.tolist()],
-        "stable": local.stable,
-        "local_margin_s": margin,
-        "first_crossing_s": local.first_crossing_s,
-        "unstable_modes": local.unstable,
-        "local_loop": local.loop,
         "conservatism": margin / bound if margin is not None and known else None,
+    }
+
+
+def _over_motion(motion: Motion, local: Local) -> dict[str, Any]:
+    """Stability and local margin over all instants."""
+    at = local.critical
+    return {
+        "critical": Critical(instant=at, time_s=float(motion.time[at])),
+        "stable": local.stable,
+        "local_margin_s": local.margin_s,
+        "first_crossing_s": local.first_crossing_s,
+        "unstable_modes": local.unstable_modes,
+        "instant_margins_s": [None if np.isnan(one.delay) else one.delay for one in local.instants],
+        "instant_basis": [one.basis for one in local.instants],
+        "local_loop": None if local.loop is None else stated_loop(local.loop, local.margin),
     }
 
 
@@ -243,45 +303,3 @@ def _shared(bounds: Bounds, common: Common | None, moving: Moving | None) -> dic
         "time_varying_windows": moving.windows if moving else (),
         "left_open": {name: reason for name, reason in open_.items() if reason},
     }
-
-
-def _assumptions(
-    system: System, criterion: Criterion, motion: Motion, local: Local
-) -> tuple[str, ...]:
-    said = [
-        "coefficients are frozen at each instant (quasi-static: the multiplier may differ from "
-        "instant to instant; `common_multiplier_delay_s` is the bound with a single one)",
-        "the embedded motor damping D_θ acts without delay",
-        f"d_1 is at most {system.delays.d_1 * 1e3:.3f} ms; it may vary below that; where no "
-        "embedded period is given, packets are sent and taken at once",
-        "the ways up and down count by their sum d_1 alone, since a stiffness is all that is fed "
-        "back; d_2 delays the feedforward and moves no root",
-        "contacts neither slip nor lift off",
-    ]
-    if system.delays.delayed_torque_feedback:
-        said.append("the embedded torque feedback acts without delay, though the design delays it")
-    if system.gravity is GravityCompensation.PLANNED:
-        said.append("gravity compensation comes from the plan and has no feedback gradient")
-    if system.feedback is Feedback.STATIC_JOINT_TANK:
-        said.append("the energy tank pays for all that u does; u = 0 while it is empty")
-    if len(system.hierarchy.levels(system.robot)) > 2:
-        said.append(
-            "a lower task's error is what the tasks above leave of it"
-            if system.task_error is TaskError.CONSISTENT
-            else "lower tasks feed back their whole errors, as printed"
-        )
-    if local.coupled:
-        said.append(
-            "motions of the base that the motors do not determine stand still: what they move of "
-            "x is an input, not part of the delayed loop; the local margin includes them"
-        )
-    if criterion is Criterion.PUBLISHED:
-        said.append(
-            "the criterion is (29)/(31) as printed: it takes Λ K_x for symmetric, x(θ) for what is "
-            "fed back and gravity for not delayed, and can certify what is unstable"
-        )
-    else:
-        said.append("passive is not stable: `stable` and the local margin are separate answers")
-    if len(motion) > 1:
-        said.append("the motion's instants are checked, not what lies between them")
-    return tuple(said)

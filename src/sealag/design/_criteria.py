@@ -1,5 +1,6 @@
 """The two criteria along a motion: certified (THEORY section 6) and published ((29), (31))."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +13,9 @@ from sealag.passivity import (
     max_delay_from_stiffness,
     max_delay_multitask,
 )
-from sealag.typing import Array
-from sealag.whole_body import (
-    Feedback,
-    StiffnessForm,
-    TankFlow,
-    TaskError,
-    WholeBodyStack,
-    relative_asymmetry,
-)
+from sealag.typing import Array, BoolArray
+from sealag.units import time_text
+from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError, relative_asymmetry
 
 ASYMMETRY_TOLERANCE = 1e-7
 """Relative asymmetry up to which a stiffness counts as symmetric: rounding, and the error of the
@@ -56,54 +51,25 @@ class Bounds:
     left_open: str = ""
 
 
-def certified_bounds(stack: WholeBodyStack, system: System) -> Bounds:
+def certified_bounds(spaces: Spaces, system: System, rest: Rest | None = None) -> Bounds:
     """Bound of THEORY section 6 for the law that is run.
 
-    Sufficient for a passive controller side along the frozen motion: the whole delayed stiffness
-    F_θ is symmetric, the task stiffness positive semidefinite, q̄(θ) a contraction where it is fed
-    back, and d_1 ≤ 1 / w(D^-½ F_θ D^-½).
+    Sufficient for a passive controller side along the frozen motion: the signal is one that a
+    potential can belong to, the drives are ideal, the motors carry the static load, no direction is
+    lost that comes back beside the instant, the whole delayed stiffness F_θ is symmetric, the task
+    stiffness positive semidefinite, and d_1 ≤ 1 / w(D^-½ F_θ D^-½).
 
     Args:
-        stack: the controller's matrices.
+        spaces: the law's matrices.
         system: the design.
+        rest: where the loop rests in its posture; None for a motion.
     """
-    reasons: list[str] = []
-    good = np.ones(len(stack), dtype=bool)
-    if system.feedback is Feedback.JOINT:
-        reasons.append(
-            "link angles are fed back, which is not collocated with the motors: no passivity "
-            "bound covers it; rely on the local margin"
-        )
-        good[:] = False
-    if system.feedback is Feedback.STATIC_JOINT_TANK and system.tank.flow is TankFlow.PUBLISHED:
-        reasons.append(
-            "the published flow of the energy tank does not pay for u's work on the spring "
-            "potential; the corrected flow does"
-        )
-        good[:] = False
-    if system.feedback is Feedback.STATIC_JOINT and (stack.contraction >= 1.0).any():
-        bad = stack.contraction >= 1.0
-        reasons.append(
-            f"q̄(θ) is no contraction at {bad.sum()} of {len(bad)} instants (factor up to "
-            f"{stack.contraction.max():.2f}): the task is stiffer than the springs"
-        )
-        good &= ~bad
-    crooked = good & ~(stack.asymmetry <= ASYMMETRY_TOLERANCE)
-    if crooked.any():
-        source = _crooked_source(system)
-        reasons.append(
-            f"the fed-back stiffness is not symmetric at {crooked.sum()} of {len(good)} instants "
-            f"(asymmetry up to {stack.asymmetry[crooked].max():.2e}, from {source}), so that no "
-            "potential belongs to it"
-        )
-        good &= ~crooked
-    negative = good & ~_semidefinite(stack.F_task)
-    if negative.any():
-        reasons.append(
-            f"the task stiffness is indefinite at {negative.sum()} of {len(good)} instants"
-        )
-        good &= ~negative
-    F = np.where(np.isnan(stack.F_theta), 0.0, stack.F_theta)
+    good, reasons = np.ones(len(spaces), dtype=bool), list[str]()
+    for refused, words in _refusals(spaces, system, rest):
+        if (good & refused).any():
+            reasons.append(words)
+            good &= ~refused
+    F = np.where(np.isfinite(spaces.F_theta), spaces.F_theta, 0.0)
     bound = max_delay_from_stiffness(F, system.actuators.motor_damping)
     return Bounds(
         delay=np.where(good, PROOF_SHARE * bound.delay, 0.0),
@@ -114,11 +80,70 @@ def certified_bounds(stack: WholeBodyStack, system: System) -> Bounds:
     )
 
 
-def _crooked_source(system: System) -> str:
+def _refusals(spaces: Spaces, system: System, rest: Rest | None) -> Iterator[tuple[BoolArray, str]]:
+    """Instants (N,) at which the criterion does not hold, and why, in words."""
+    count, everywhere = len(spaces), np.ones(len(spaces), dtype=bool)
+    signal = system.law.signal.refusal(spaces.contraction)
+    if signal is not None:
+        yield signal.instants, signal.reason
+    for words in _drive_refusals(system):
+        yield everywhere, words
+    for i, joint in enumerate(system.robot.joints):
+        load, limit = np.abs(spaces.gravity[:, i]), system.actuators.torque_limit[i]
+        if rest is not None:
+            load = np.maximum(load, abs(float(rest.tau_sea[i])))
+        yield (
+            load > limit,
+            (
+                f"the motor of {joint} gives at most {limit:g} Nm, and gravity asks for "
+                f"{load.max():.3g} Nm at {(load > limit).sum()} of {count} instants"
+            ),
+        )
+    yield (
+        spaces.singular,
+        (
+            f"contacts or tasks lose a direction at {spaces.singular.sum()} of {count} instants "
+            "that they have beside it, where the stiffness jumps; certify postures away from the "
+            "singularity"
+        ),
+    )
+    bent = ~(spaces.asymmetry <= ASYMMETRY_TOLERANCE)
+    if bent.any():
+        yield (
+            bent,
+            (
+                f"the fed-back stiffness is not symmetric at {bent.sum()} of {count} instants "
+                f"(asymmetry up to {spaces.asymmetry[bent].max():.2e}, from "
+                f"{_asymmetry_source(system)}), so that no potential belongs to it"
+            ),
+        )
+    negative = ~_semidefinite(spaces.F_task)
+    yield negative, f"the task stiffness is indefinite at {negative.sum()} of {count} instants"
+
+
+def _drive_refusals(system: System) -> Iterator[str]:
+    """Why drives that are late are covered by no passive bound (THEORY section 14)."""
+    slow = np.flatnonzero(np.isfinite(system.actuators.torque_bandwidth))
+    if len(slow):
+        joint, rate = system.robot.joints[slow[0]], system.actuators.torque_bandwidth[slow[0]]
+        yield (
+            f"the torque of {joint} follows its command with {rate:g} rad/s (torque_bandwidth), so "
+            "that motor damping and torque feedback come late: no passivity bound covers it; rely "
+            "on the local margin"
+        )
+    if system.late_joints:
+        yield (
+            f"the torque feedback of {system.late_joints[0]} is late by "
+            f"{time_text(system.delays.torque_feedback_delay)} (delayed_torque_feedback, "
+            "inertia_shaping other than 1): no passivity bound covers it; rely on the local margin"
+        )
+
+
+def _asymmetry_source(system: System) -> str:
     """What makes a stiffness asymmetric."""
-    if system.hierarchy.form is StiffnessForm.PUBLISHED:
+    if system.law.stiffness_form is StiffnessForm.PUBLISHED:
         return "the stiffness Λ K_x"
-    if system.task_error is TaskError.PLAIN and len(system.hierarchy.levels(system.robot)) > 2:
+    if system.law.task_error is TaskError.PLAIN and len(system.law.levels(system.robot)) > 2:
         return "lower tasks that feed back what higher ones move"
     return "fed-back gravity compensation where contacts or free motions make joints dependent"
 
@@ -128,47 +153,45 @@ def _semidefinite(F: Array) -> Array:
     return values[:, 0] >= -1e-9 * np.maximum(np.abs(values).max(axis=1), 1e-300)
 
 
-def task_stiffness(stack: WholeBodyStack, system: System, kind: Criterion) -> Array:
+def task_stiffness(spaces: Spaces, system: System, kind: Criterion) -> Array:
     """Return the task stiffness S that a criterion uses, (N, m, m).
 
     Args:
-        stack: the controller's matrices.
+        spaces: the law's matrices.
         system: the design.
         kind: published takes Λ K_x whatever is run, unless the stiffness has no Λ.
     """
     if kind is Criterion.CERTIFIED:
-        return stack.stiffness
-    if system.hierarchy.form is StiffnessForm.FORCE:
-        return np.broadcast_to(stack.K_x, stack.stiffness.shape)
-    return stack.Lambda @ stack.K_x
+        return spaces.stiffness
+    if system.law.stiffness_form is StiffnessForm.FORCE:
+        return np.broadcast_to(spaces.K_x, spaces.stiffness.shape)
+    return spaces.Lambda @ spaces.K_x
 
 
-def asymmetry(stack: WholeBodyStack, bounds: Bounds, kind: Criterion) -> Array:
+def asymmetry(spaces: Spaces, bounds: Bounds, kind: Criterion) -> Array:
     """Return the relative asymmetry that a certificate states, (N,).
 
     Args:
-        stack: the controller's matrices.
+        spaces: the law's matrices.
         bounds: of the criterion.
         kind: published states that of its own stiffness, certified that of what is fed back.
     """
-    return relative_asymmetry(bounds.F) if kind is Criterion.PUBLISHED else stack.asymmetry
+    return relative_asymmetry(bounds.F) if kind is Criterion.PUBLISHED else spaces.asymmetry
 
 
-def published_bounds(
-    stack: WholeBodyStack, system: System, *, solver: Solver | None = None
-) -> Bounds:
+def published_bounds(spaces: Spaces, system: System, *, solver: Solver | None = None) -> Bounds:
     """Bound of (29), or of (31) for several priority levels, as printed.
 
     Args:
-        stack: the controller's matrices.
+        spaces: the law's matrices.
         system: the design.
         solver: where multipliers of several levels come from; Clarabel's own interface if None.
     """
     D = system.actuators.motor_damping
-    form = system.hierarchy.form.printed
-    levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
-    S = task_stiffness(stack, system, Criterion.PUBLISHED)
-    F = np.swapaxes(stack.J_star, -1, -2) @ S @ stack.J_star
+    form = system.law.stiffness_form.printed
+    levels = [spaces.level(k) for k in range(len(spaces.levels) - 1)]
+    S = task_stiffness(spaces, system, Criterion.PUBLISHED)
+    F = np.swapaxes(spaces.J_star, -1, -2) @ S @ spaces.J_star
     whole = max_delay_from_stiffness(F, D)
     if len(levels) == 1:
         bound = max_delay(*levels[0], D, form=form)

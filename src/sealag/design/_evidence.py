@@ -5,15 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sealag.design._criteria import (
-    ASYMMETRY_TOLERANCE,
-    PROOF_SHARE,
-    Bounds,
-    task_stiffness,
-)
+from sealag.design._criteria import PROOF_SHARE, Bounds, task_stiffness
 from sealag.design._system import System
 from sealag.errors import SolverError
-from sealag.margin import delay_margin
+from sealag.margin import DelayMargin
 from sealag.passivity import (
     Criterion,
     LocalLoop,
@@ -27,10 +22,7 @@ from sealag.passivity import (
 )
 from sealag.robot import Motion
 from sealag.typing import Array
-from sealag.whole_body import Feedback, Linearisation, WholeBodyStack
-
-COUPLING_TOLERANCE = 1e-6
-"""Share of F from which an answer to passive motions of the base counts."""
+from sealag.whole_body import FrozenLoop, Spaces
 
 POLYTOPE_WINDOW = 20
 """Intervals between instants in one window of the time-varying bound."""
@@ -68,33 +60,6 @@ class Moving:
     W: Array | None
     windows: tuple[Window, ...]
     left_open: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Local:
-    """What is known of the frozen loop at one instant.
-
-    Attributes:
-        margin_s: exact delay margin, s; None if it could not be decided.
-        first_crossing_s: first delay at which roots cross, s; None likewise.
-        unstable: roots with positive real part without delay.
-        stable: whether the potential has a strict minimum; without a potential, because the law
-            answers to passive motions, whether no root is unstable; None where unknown.
-        coupling: ‖−∂τ_osc/∂z‖ at fixed θ over ‖F‖, z the motions that contacts leave free.
-        loop: the loop; None where the fed-back signal has none.
-    """
-
-    margin_s: float | None
-    first_crossing_s: float | None
-    unstable: int
-    stable: bool | None
-    coupling: float
-    loop: LocalLoop | None
-
-    @property
-    def coupled(self) -> bool:
-        """Whether the law answers to passive motions of the base."""
-        return self.coupling > COUPLING_TOLERANCE
 
 
 def common_multiplier(system: System, bounds: Bounds, *, solver: Solver | None) -> Common:
@@ -177,64 +142,51 @@ def worst_motion(system: System, bounds: Bounds, instant: int) -> Array:
         instant: the worst one.
     """
     root = 1.0 / np.sqrt(system.actuators.motor_damping)
-    A, phi = root[:, None] * bounds.F[instant] * root, bounds.angle[instant]
-    H = np.cos(phi) * (A + A.T) / 2.0 + 0.5j * np.sin(phi) * (A - A.T)
-    return root * np.linalg.eigh(H)[1][:, -1]
+    A, phi = root[:, None] * bounds.F[instant] * root, float(bounds.angle[instant])
+    for _ in range(100):
+        H = np.cos(phi) * (A + A.T) / 2.0 + 0.5j * np.sin(phi) * (A - A.T)
+        x = np.linalg.eigh(H)[1][:, -1]
+        before, phi = phi, -float(np.angle(x.conj() @ A @ x))
+        if abs(phi - before) <= 1e-14:
+            break
+    return root * x
 
 
-def frozen_loop(system: System, motion: Motion, stack: WholeBodyStack, *, instant: int) -> Local:
-    """Exact local margin at an instant, and whether its potential has a minimum.
+def refuted_delay(system: System, bounds: Bounds, instant: int, motion: Array) -> float:
+    """Delay above which a motion turns the delayed loop active, y* D_θ y / |y* F y|, s.
 
     Args:
         system: the design.
-        motion: its instants.
-        stack: the controller's matrices.
-        instant: which one.
+        bounds: of the criterion.
+        instant: the worst one.
+        motion: (n,) complex motor velocities y.
     """
-    if not np.isfinite(stack.F_theta[instant]).all():
-        return Local(
-            margin_s=None, first_crossing_s=None, unstable=0, stable=None, coupling=0.0, loop=None
-        )
-    frozen = system.frozen(motion, stack, instant)
-    try:
-        margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries)
-        margin_s, crossing_s = float(margin.delay), float(margin.first_crossing)
-        unstable, frequency = margin.unstable_roots, margin.frequency
-    except SolverError:
-        values = np.linalg.eigvals(frozen.A_0 + frozen.A_1)
-        unstable = int((values.real > 1e-9 * np.abs(values).max()).sum())
-        margin_s, crossing_s, frequency = 0.0 if unstable else None, None, math.nan
-    symmetric = stack.asymmetry[instant] <= ASYMMETRY_TOLERANCE
-    stable = frozen.stable if symmetric and system.feedback is not Feedback.JOINT else None
-    coupling = 0.0 if system.feedback is Feedback.JOINT else frozen.passive_coupling
-    if coupling > COUPLING_TOLERANCE:
-        stable = unstable == 0
-    return Local(
-        margin_s=margin_s,
-        first_crossing_s=crossing_s,
-        unstable=unstable,
-        stable=stable,
-        coupling=coupling,
-        loop=_loop(system, frozen, frequency),
-    )
+    power = float(system.actuators.motor_damping @ np.abs(motion) ** 2)
+    return power / max(abs(motion.conj() @ bounds.F[instant] @ motion), 1e-300)
 
 
-def _loop(system: System, frozen: Linearisation, frequency: float) -> LocalLoop:
-    half = len(frozen.A_0) // 2
+def stated_loop(loop: FrozenLoop, margin: DelayMargin | None) -> LocalLoop:
+    """Return a frozen loop as a certificate states it.
+
+    Args:
+        loop: the loop.
+        margin: its margin; None if it could not be decided.
+    """
+    crosses = margin is not None and math.isfinite(margin.frequency)
     return LocalLoop(
-        P=(-frozen.A_0[half:, :half]).tolist(),
-        R=(-frozen.A_0[half:, half:]).tolist(),
-        L=(-frozen.A_1[half:, :half]).tolist(),
-        symmetries=frozen.symmetries[:half].tolist(),
-        motor_inertia=system.actuators.shaped_inertia.tolist(),
-        spring_damping=system.actuators.spring_damping.tolist(),
-        frequency_rad_s=float(frequency),
+        A_0=loop.A_0.tolist(),
+        A_1=loop.A_1.tolist(),
+        A_e=loop.A_e.tolist() if loop.A_e.any() else None,
+        embedded_delay_s=loop.embedded_delay,
+        symmetries=loop.symmetries.tolist(),
+        states=list(loop.states),
+        frequency_rad_s=float(margin.frequency) if margin is not None and crosses else None,
     )
 
 
 def instant_proofs(
     system: System,
-    stack: WholeBodyStack,
+    spaces: Spaces,
     bounds: Bounds,
     *,
     kind: Criterion,
@@ -246,7 +198,7 @@ def instant_proofs(
 
     Args:
         system: the design.
-        stack: the controller's matrices.
+        spaces: the law's matrices.
         bounds: of the criterion.
         kind: which criterion.
         count: how many of the smallest bounds; None for all.
@@ -263,10 +215,20 @@ def instant_proofs(
     proofs, missing = [], {}
     for k in (*order[:count].tolist(), *extra):
         try:
-            proofs.append(_proof(system, stack, bounds, kind=kind, instant=k, solver=solver))
+            proofs.append(_proof(system, spaces, bounds, kind=kind, instant=k, solver=solver))
         except SolverError as error:
             missing[k] = str(error)
     return tuple(proofs), missing
+
+
+def without_bounds(bounds: Bounds) -> Bounds:
+    """Return the same with no bound at any instant, as under the published criterion, whose bounds
+    decide no stability.
+
+    Args:
+        bounds: of the certified criterion.
+    """
+    return replace(bounds, delay=np.zeros_like(bounds.delay))
 
 
 def without(bounds: Bounds, missing: dict[int, str]) -> Bounds:
@@ -285,7 +247,7 @@ def without(bounds: Bounds, missing: dict[int, str]) -> Bounds:
 
 def _proof(
     system: System,
-    stack: WholeBodyStack,
+    spaces: Spaces,
     bounds: Bounds,
     *,
     kind: Criterion,
@@ -294,10 +256,10 @@ def _proof(
 ) -> Proof:
     D, d, F = system.actuators.motor_damping, float(bounds.delay[instant]), bounds.F[instant]
     if kind is Criterion.PUBLISHED:
-        levels = [stack.level(k) for k in range(len(stack.levels) - 1)]
+        levels = [spaces.level(k) for k in range(len(spaces.levels) - 1)]
         tasks = [(J[instant], Lambda[instant], K_x) for J, Lambda, K_x in levels]
         found = task_multipliers(
-            tasks, D, delay=d, form=system.hierarchy.form.printed, solver=solver
+            tasks, D, delay=d, form=system.law.stiffness_form.printed, solver=solver
         )
         W = [(one.W + one.W.T) / 2.0 for one in found]
     else:
@@ -305,9 +267,9 @@ def _proof(
     return Proof(
         instant=instant,
         delay_s=d,
-        J_star=stack.J_star[instant].tolist(),
-        stiffness=task_stiffness(stack, system, kind)[instant].tolist(),
-        F_gravity=stack.F_gravity[instant].tolist(),
+        J_star=spaces.J_star[instant].tolist(),
+        stiffness=task_stiffness(spaces, system, kind)[instant].tolist(),
+        F_gravity=spaces.F_gravity[instant].tolist(),
         F=F.tolist(),
         W=[block.tolist() for block in W],
         Q=[(block / d).tolist() for block in W],

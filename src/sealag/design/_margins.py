@@ -1,18 +1,19 @@
 """Exact local margins along a motion."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from sealag.design._criteria import certified_bounds
+from sealag.design._local import local_of, margin_of
 from sealag.design._system import System
-from sealag.errors import ContractionError
-from sealag.margin import DelayMargin, Interval, delay_margin
+from sealag.errors import ContractionError, InputError, SolverError
+from sealag.margin import Interval
+from sealag.passivity import Basis
 from sealag.robot import Motion
-from sealag.whole_body import Linearisation
-
-LARGEST_SAMPLE = 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,102 +21,105 @@ class LocalMargins:
     """The smallest exact local margin over a motion.
 
     Attributes:
-        delay_s: smallest margin, s; 0 where the loop is unstable without delay.
-        first_crossing_s: smallest delay at which one more pair of roots crosses, s.
-        frequency_rad_s: frequency of that pair, rad/s.
+        delay_s: smallest margin, s; 0 where the loop is unstable without delay; None if an instant
+            was left open and none is unstable.
+        first_crossing_s: smallest delay at which one more pair of roots crosses, s; None if not
+            known.
+        frequency_rad_s: frequency of that pair, rad/s; None without one.
         mode: share of each joint's motor in that pair's motion.
         unstable_modes: roots with positive real part without delay, at that instant.
         neutral: structural zero roots there.
+        equilibrium: whether the loop rests there, or why it does not.
         instant: index of that instant.
         time_s: its time, s.
         instants: number of instants of the motion.
-        evaluated: number of them that were evaluated, evenly spaced.
+        exact: number of them that were decided exactly.
+        bounded: number of them whose margin lies above their passive bound, decided by it.
         intervals: ranges of delay at that instant with their numbers of unstable roots, when a
             horizon was given; else empty.
     """
 
-    delay_s: float
-    first_crossing_s: float
-    frequency_rad_s: float
+    delay_s: float | None
+    first_crossing_s: float | None
+    frequency_rad_s: float | None
     mode: Mapping[str, float]
     unstable_modes: int
     neutral: int
+    equilibrium: str
     instant: int
     time_s: float
     instants: int
-    evaluated: int
+    exact: int
+    bounded: int
     intervals: tuple[Interval, ...]
 
     def summary(self) -> dict[str, Any]:
-        """Return everything, with None for what is not finite: no delay is too long."""
-        plain = {key: _number(value) for key, value in asdict(self).items()}
+        """Return everything as JSON says it: "unbounded" for a time that no delay reaches, None for
+        what is not known."""
+        plain = {key: _stated(value) for key, value in asdict(self).items()}
         plain["intervals"] = [
-            {"from_s": low, "to_s": _number(high), "unstable_roots": count}
-            for low, high, count in self.intervals
+            {
+                "from_s": part.lower,
+                "to_s": _stated(part.upper),
+                "unstable_roots": part.unstable_roots,
+            }
+            for part in self.intervals
         ]
         return plain
 
 
-def _number(value: Any) -> Any:
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+def _stated(value: Any) -> Any:
+    return "unbounded" if isinstance(value, float) and math.isinf(value) else value
 
 
 def local_margins(
     system: System, motion: Motion | None = None, *, horizon: float | None = None
 ) -> LocalMargins:
-    """Compute the exact local margin of the law that is run, along a motion.
+    """Decide the exact local margin of the law that runs, over all instants of a motion.
 
-    Necessary and sufficient for local stability at constant delay with frozen coefficients. The
-    delay is d_1, the sum of all ways around the loop, however it is split: a stiffness is all that
-    is fed back, and d_2 moves no root (`sealag.margin.delay_margin` says where this ends). Embedded
-    torque feedback that the design delays is taken as immediate.
+    Necessary and sufficient for local stability at constant delay with frozen coefficients, where
+    the loop that holds an instant rests. The delay is d_1, the sum of all ways around the loop,
+    however it is split; torque feedback that the design delays in its drives has that delay of its
+    own besides. Of the instants that a potential decides only those are computed whose passive
+    bound lies below the smallest margin; the others lie above it.
 
     Args:
         system: the design.
-        motion: the motion; the system's posture if None. Of long ones, 200 evenly spaced
-            instants are evaluated.
+        motion: the motion; the system's posture if None.
         horizon: longest delay up to which the ranges of stable and unstable delay are listed, s.
 
     Raises:
         InputError: the horizon is not a positive time.
-        ContractionError: q̄(θ) is fed back and has no contraction.
+        ContractionError: q̄(θ) is fed back and does not exist.
+        SolverError: the margin at the instant that sets it could not be decided.
     """
+    if horizon is not None and not (math.isfinite(horizon) and horizon > 0.0):
+        raise InputError(f"horizon is {horizon} s; a positive time is needed.")
     motion = system.still() if motion is None else motion
-    sample = np.unique(np.linspace(0, len(motion) - 1, LARGEST_SAMPLE).astype(int))
-    part = Motion(
-        time=motion.time[sample],
-        q=motion.q[sample],
-        v=motion.v[sample],
-        contact_sets=motion.contact_sets,
-        contact_index=motion.contact_index[sample],
-    )
-    stack = system.evaluate(part)
-    if not np.isfinite(stack.F_theta).all():
-        raise ContractionError(
-            f"q̄(θ) is fed back but is no contraction (factor {stack.contraction.max():.2f}): the "
-            "task is stiffer than the springs, so there is no loop to analyse."
-        )
-    found: list[tuple[DelayMargin, Linearisation]] = []
-    for k in range(len(part)):
-        frozen = system.frozen(part, stack, k)
-        found.append((delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries), frozen))
-    at = min(range(len(found)), key=lambda k: (found[k][0].delay, found[k][0].first_crossing))
-    margin, frozen = found[at]
+    spaces = system.spaces(motion)
+    local = local_of(system, motion, spaces, certified_bounds(spaces, system))
+    margin, loop, rest = local.margin, local.loop, local.rest
+    if loop is None:
+        raise ContractionError(local.problem)
+    if margin is None:
+        raise SolverError(local.problem)
     if horizon is not None:
-        margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries, horizon=horizon)
-    n, k = system.robot.n, frozen.Z.shape[1]
-    size = np.abs(margin.mode[k : k + n]) if len(margin.mode) else np.zeros(n)
+        margin = margin_of(loop, horizon=horizon)
+    motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
+    size = np.abs(margin.mode[motors]) if len(margin.mode) else np.zeros(len(motors))
     shares = size / max(float(size.sum()), 1e-300)
     return LocalMargins(
-        delay_s=float(margin.delay),
-        first_crossing_s=float(margin.first_crossing),
-        frequency_rad_s=float(margin.frequency),
+        delay_s=local.margin_s,
+        first_crossing_s=local.first_crossing_s,
+        frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=dict(zip(system.robot.joints, shares.tolist(), strict=True)),
         unstable_modes=margin.unstable_roots,
         neutral=margin.neutral,
-        instant=int(sample[at]),
-        time_s=float(part.time[at]),
+        equilibrium="found" if rest is not None and rest.found else local.problem,
+        instant=local.critical,
+        time_s=float(motion.time[local.critical]),
         instants=len(motion),
-        evaluated=len(part),
+        exact=local.count(Basis.EXACT),
+        bounded=local.count(Basis.BOUND),
         intervals=margin.intervals,
     )

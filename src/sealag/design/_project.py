@@ -22,8 +22,8 @@ from sealag.delay import (
     measured,
 )
 from sealag.design._plain_words import first_problem
-from sealag.design._schema import Project, SamplesDelay
-from sealag.design._system import System, Tank
+from sealag.design._schema import AXES, Project, SamplesDelay
+from sealag.design._system import Source, System
 from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
 from sealag.files import read_whole
@@ -38,21 +38,11 @@ from sealag.robot import (
     resolve_urdf,
 )
 from sealag.typing import Array
-from sealag.whole_body import (
-    Feedback,
-    GravityCompensation,
-    Hierarchy,
-    StiffnessForm,
-    TankFlow,
-    Task,
-    TaskError,
-    TaskInertia,
-    TaskKind,
-)
+from sealag.units import number_of
+from sealag.whole_body import Law, Signal, Tank, TankFlow, Task, TaskKind, signal_named
 
 LARGEST_PROJECT_BYTES = 1_000_000
 LARGEST_SAMPLES_BYTES = 50_000_000
-_AXES = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
 _REQUIRED = ("spring_stiffness", "rotor_inertia", "motor_damping", "inertia_shaping")
 
 
@@ -143,12 +133,15 @@ def _system(project: Any, path: Path, text: str) -> System:
             floating_base=project.robot.base == "floating",
             actuated=project.robot.actuated,
         )
-    hierarchy = Hierarchy(
+    law = Law(
         tasks=tuple(_task(section) for section in project.tasks),
-        form=StiffnessForm(project.controller.stiffness_form),
-        task_inertia=TaskInertia(project.controller.task_inertia),
+        signal=_fed_back(project.controller),
+        gravity=project.controller.gravity,
+        stiffness_form=project.controller.stiffness_form,
+        task_inertia=project.controller.task_inertia,
+        task_error=project.controller.task_error,
     )
-    hierarchy.gain(robot)
+    law.gain(robot)
     motion_file = folder / project.motion.file if project.motion else None
     if motion_file and not motion_file.is_file():
         raise FileError(f"{path}: motion.file is {project.motion.file!r}; there is no such file.")
@@ -158,26 +151,32 @@ def _system(project: Any, path: Path, text: str) -> System:
         name=path.stem,
         robot=robot,
         actuators=_actuators(project.actuators, robot, path),
-        hierarchy=hierarchy,
+        law=law,
         contacts=_contacts(project.contacts, robot, path),
         posture=_posture(project.posture, robot, path),
-        feedback=Feedback(project.controller.feedback),
-        gravity=GravityCompensation(project.controller.gravity),
-        task_error=TaskError(project.controller.task_error),
-        tank=Tank(
-            flow=TankFlow(project.controller.tank_flow),
-            energy=project.controller.tank_energy_j,
-            rate=project.controller.tank_rate,
-        ),
         criterion=Criterion(project.controller.criterion),
         delays=_delays(project.delays, folder, path),
-        motion_file=motion_file,
-        sha256=hashlib.sha256(text.encode()).hexdigest(),
         simulation=project.simulation,
         walking=walking_of(project.walking, robot),
-        text=text,
-        files=tuple(file for file in files if file is not None),
+        source=Source(
+            text=text,
+            sha256=hashlib.sha256(text.encode()).hexdigest(),
+            files=tuple(file for file in files if file is not None),
+            motion_file=motion_file,
+        ),
     )
+
+
+def _fed_back(section: Any) -> Signal:
+    """The signal of [controller], with the tank's settings where it is the tank."""
+    signal = signal_named(section.feedback)
+    if isinstance(signal, Tank):
+        return Tank(
+            energy=section.tank_energy_j,
+            rate=section.tank_rate,
+            flow=TankFlow(section.tank_flow),
+        )
+    return signal
 
 
 def _contacts(sections: Any, robot: Robot, path: Path) -> tuple[Contact, ...]:
@@ -218,7 +217,7 @@ def _posture(section: Any, robot: Robot, path: Path) -> Array:
 
 
 def _task(section: Any) -> Task:
-    axes = tuple(_AXES[axis] for axis in section.axes)
+    axes = tuple(AXES.index(axis) for axis in section.axes)
     if section.kind == "orientation":
         axes = tuple(axis - 3 if axis >= 3 else axis for axis in axes)
     return Task(
@@ -250,11 +249,35 @@ def _actuators(section: Any, robot: Robot, path: Path) -> Actuators:
                     f"{path}: {key} of joint {name} is missing; "
                     f"give it in [actuators.default] or [actuators.joint.{name}]."
                 )
-    optional = {key for values in every for key in values}
-    for key in optional:
-        fallback = np.inf if key in {"torque_limit", "velocity_limit", "torque_bandwidth"} else 0.0
-        columns[key] = [values.get(key, fallback) for values in every]
+    optional = {key for values in every for key in values} - set(_REQUIRED)
+    for key in _REQUIRED:
+        columns[key] = [values[key] for values in every]
+    for key in optional | set(_OF_URDF):
+        fallback = _fallback(key, robot)
+        columns[key] = [values.get(key, own) for values, own in zip(every, fallback, strict=True)]
     return actuators(robot.joints, **columns)
+
+
+_OF_URDF = ("torque_limit", "velocity_limit", "coulomb_friction")
+"""Keys of actuators whose values the URDF states where the project does not."""
+
+
+def _fallback(key: str, robot: Robot) -> Array:
+    """What holds for joints (n,) at which the project does not give a key.
+
+    A velocity limit of 0 in a URDF forbids every motion: it stands for one that is not known.
+    """
+    match key:
+        case "torque_limit":
+            return robot.effort_limit
+        case "velocity_limit":
+            return np.where(robot.velocity_limit > 0.0, robot.velocity_limit, np.inf)
+        case "coulomb_friction":
+            return robot.friction
+        case "torque_bandwidth":
+            return np.full(robot.n, np.inf)
+        case _:
+            return np.zeros(robot.n)
 
 
 def _delays(section: Any, folder: Path, path: Path) -> Delays:
@@ -319,12 +342,12 @@ def _samples(section: Any, folder: Path) -> DelaySignal:
     content = read_whole(path, what="The delay samples", largest=LARGEST_SAMPLES_BYTES)
     values = []
     for row, line in enumerate(content.decode("utf-8-sig", "replace").splitlines(), start=1):
-        try:
-            values += [float(line)] if line.strip() else []
-        except ValueError as error:
+        value = number_of(line)
+        if value is None and line.strip():
             raise ProjectError(
                 f"{path}: line {row} is {line.strip()[:60]!r}; one number, a delay in ms, is right."
-            ) from error
+            )
+        values += [] if value is None else [value]
     if not values:
         raise ProjectError(f"{path} is empty; one delay in ms a line is needed.")
     return measured(np.array(values) * 1e-3, period=section.period_s, quantile=section.quantile)

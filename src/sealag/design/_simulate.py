@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sealag.design._criteria import certified_bounds
+from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
 from sealag.design._walking import Walking
 from sealag.errors import InputError, either
@@ -29,9 +30,8 @@ from sealag.simulation import (
     touching_posture,
 )
 from sealag.typing import Array
-from sealag.whole_body import Controller, ControllerOptions, TaskKind, TickController
+from sealag.whole_body import Controller, TaskKind, TickController
 
-SCENARIOS = ("regulate", "track", "drop", "balance", "walk")
 LONGEST_STEP = 1e-3
 """Longest physics step, s."""
 SHORTEST_STEP = 1e-5
@@ -116,12 +116,7 @@ def simulate(
             torque_limit=system.actuators.torque_limit,
         )
     controller = _controller(system, kind, q)
-    held, theta = q, None
-    if kind == "drop" and system.robot.floating_base:
-        q = q.copy()
-        q[2] += setting.drop_height
-    elif kind == "drop":
-        theta = system.robot.joint_positions(q)
+    held, (q, theta) = q, _start(system, kind, q)
     run = closed_loop(
         system.robot,
         system.actuators,
@@ -134,12 +129,25 @@ def simulate(
     return _with_delay_storage(run, system, held)
 
 
+def _start(system: System, kind: str, held: Array) -> tuple[Array, Array | None]:
+    """First configuration and motor angles: where the loop that holds a posture rests, if it does;
+    for a drop above the ground, or with springs that do not yet carry the joints."""
+    if kind == "drop" and not system.robot.floating_base:
+        return held, system.robot.joint_positions(held)
+    q = held.copy()
+    if kind == "drop":
+        q[2] += system.simulation.drop_height
+        return q, None
+    rest = replace(system, posture=held).rest()
+    return (rest.q, rest.theta) if rest.found else (q, None)
+
+
 def _with_delay_storage(run: Run, system: System, q: Array) -> Run:
     """Add V_4 with the multiplier that certifies the held posture, if one does."""
     if run.audit.controller_side is None or len(run.time) < 3:
         return run
     motion = replace(system.still(), q=q[None])
-    bounds = certified_bounds(system.evaluate(motion), system)
+    bounds = certified_bounds(system.spaces(motion), system)
     delay = float(bounds.delay[0])
     if not 0.0 < delay < math.inf:
         return run
@@ -226,31 +234,16 @@ class _Tracking:
 
 def _controller(system: System, kind: str, q: Array) -> TickController:
     """The design's controller, holding where it stands or tracking about it."""
-    m = system.hierarchy.levels(system.robot)[-1]
+    if kind != "track":
+        return system.controller(q)
+    m = system.law.levels(system.robot)[-1]
     w = 2.0 * math.pi * system.simulation.track_frequency_hz
     size, row = system.simulation.track_amplitude, np.eye(m)[0]
 
     def wave(t: float) -> tuple[Array, Array]:
         return size * (1.0 - math.cos(w * t)) / 2.0 * row, size * w * math.sin(w * t) / 2.0 * row
 
-    controller = Controller(
-        system.robot,
-        system.hierarchy,
-        system.actuators,
-        contacts=system.contacts,
-        posture=q,
-        options=ControllerOptions(
-            feedback=system.feedback,
-            gravity=system.gravity,
-            task_error=system.task_error,
-            tank_flow=system.tank.flow,
-            tank_energy=system.tank.energy,
-            tank_rate=system.tank.rate,
-            delay_bound=system.delays.d_1,
-        ),
-        reference=wave if kind == "track" else None,
-    )
-    return _Tracking(controller) if kind == "track" else controller
+    return _Tracking(system.controller(q, reference=wave))
 
 
 def _feet(system: System) -> list[Foot]:
@@ -282,7 +275,7 @@ def _pushes(system: System, kind: str) -> list[Push]:
         for push in system.simulation.pushes
     ]
     if kind == "balance" and not pushes:
-        frames = [t.frame for t in system.hierarchy.tasks if t.frame and t.kind is not TaskKind.COM]
+        frames = [t.frame for t in system.law.tasks if t.frame and t.kind is not TaskKind.COM]
         frame = frames[0] if frames else system.robot.joints[-1]
         force = 0.05 * system.robot.mass * 9.81
         pushes = [Push(frame=frame, force=(force, 0.0, 0.0), start=0.2, duration=0.1)]

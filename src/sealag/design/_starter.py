@@ -73,7 +73,7 @@ def _posture(robot: Robot, feet: list[str], reference: ReferencePosture | None) 
         origin = "rad or m; those left out are 0"
         positions = np.array([_middle(robot, k) for k in range(robot.n)])
         if feet:
-            carrying = robot.frame_mounts(feet)[3][:, robot.nv_base :].max(axis=0) > 0
+            carrying = robot.carriers(feet)
             origin += "; on straight legs nothing is stable: bend the knees"
     values = [
         '"FILL: rad"' if fill else f"{value:.4g}"

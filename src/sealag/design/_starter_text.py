@@ -9,7 +9,7 @@ REQUIRED = """\
 [robot]
 urdf = {urdf}
 base = "{base}"          # "floating" or "fixed"
-actuated = [             # joints with an actuator; the others are locked at 0, mimics too
+actuated = [             # joints with an actuator; their mimics follow, the others are locked
 {actuated}
 ]
 

@@ -1,7 +1,9 @@
-"""A design: robot, actuators, controller and delays."""
+"""A design: robot, actuators, law, contacts, posture and delays."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,81 +11,120 @@ from sealag.actuation import Actuators
 from sealag.delay import Delays
 from sealag.design._schema import SimulationSection
 from sealag.design._walking import Walking
+from sealag.errors import InputError
 from sealag.passivity import Criterion
-from sealag.robot import Contact, Motion, Robot
-from sealag.typing import Array
+from sealag.robot import Contact, Motion, Robot, require_within_limits
+from sealag.typing import Array, ArrayLike
 from sealag.whole_body import (
-    Feedback,
-    GravityCompensation,
-    Hierarchy,
-    Linearisation,
-    TankFlow,
-    TaskError,
-    WholeBodyStack,
-    evaluate,
-    linearise,
-    passive_stiffness,
+    Controller,
+    FrozenLoop,
+    Law,
+    Rest,
+    Spaces,
+    freeze,
+    posture_of,
+    rest_of,
+    spaces_along,
 )
+
+if TYPE_CHECKING:
+    from sealag.simulation import Run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tank:
-    """The energy tank of a design.
+class Source:
+    """The project file that a system was read from.
 
     Attributes:
-        flow: what its energy pays for.
-        energy: at the start, J.
-        rate: at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s.
+        text: the file's own text, which recordings carry along.
+        sha256: of the file.
+        files: everything that was read: project, URDF, motion, delay samples.
+        motion_file: the project's own motion, if it names one.
     """
 
-    flow: TankFlow = TankFlow.CORRECTED
-    energy: float = 1.0
-    rate: float = 5.0
+    text: str
+    sha256: str
+    files: tuple[Path, ...]
+    motion_file: Path | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class System:
-    """A robot with its actuators, controller and delays: what a project file describes.
+    """A robot with its actuators, law and delays, in SI units: what is certified, frozen, simulated
+    and run.
 
     Attributes:
-        name: the project file's name.
         robot: the robot.
         actuators: its series elastic actuators.
-        hierarchy: the controller's tasks.
+        law: the whole-body control law.
+        posture: (nq,) configuration that the law holds, and that is certified without a motion.
+        delays: both connections' delays.
         contacts: which frames are held when a motion does not say it.
-        posture: (nq,) configuration that is certified without a motion.
-        feedback: the signal that is fed back.
-        gravity: where gravity compensation takes its configuration from.
-        task_error: which error tasks below the first level feed back.
-        tank: flow, energy and rate of the energy tank, for feedback through it.
+        name: what messages and files call it.
         criterion: the criterion that certifies by default.
-        delays: both loops' delays.
-        motion_file: the project's own motion, if it names one.
-        sha256: of the project file; empty if the system was built in Python.
-        simulation: the project's [simulation] section.
-        walking: the walk that the project describes; None if it has no [walking] section.
-        text: the project file's own text, which recordings carry along.
-        files: everything that it was read from: project, URDF, motion, delay samples.
+        simulation: how it is simulated.
+        walking: a walk; None if there is none.
+        source: the project file that it was read from; None if it was built in Python.
     """
 
-    name: str
     robot: Robot
     actuators: Actuators
-    hierarchy: Hierarchy
-    contacts: tuple[Contact, ...]
+    law: Law
     posture: Array
-    feedback: Feedback
-    gravity: GravityCompensation
-    task_error: TaskError
-    tank: Tank
-    criterion: Criterion
     delays: Delays
-    motion_file: Path | None
-    sha256: str
-    simulation: SimulationSection
-    walking: Walking | None
-    text: str
-    files: tuple[Path, ...]
+    contacts: tuple[Contact, ...] = ()
+    name: str = "system"
+    criterion: Criterion = Criterion.CERTIFIED
+    simulation: SimulationSection = field(default_factory=SimulationSection)
+    walking: Walking | None = None
+    source: Source | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse parts that do not fit each other.
+
+        Raises:
+            InputError: actuators are of other joints, the posture has another shape or lies outside
+                the joints' limits, or a robot on a fixed base has contacts.
+            UnknownNameError: a frame or joint of a task or contact does not exist.
+        """
+        object.__setattr__(self, "posture", np.asarray(self.posture, dtype=float))
+        object.__setattr__(self, "contacts", tuple(self.contacts))
+        if self.actuators.joints != self.robot.joints:
+            raise InputError(
+                f"The actuators are of {', '.join(self.actuators.joints)}, the robot's joints are "
+                f"{', '.join(self.robot.joints)}; both must be the same, in this order."
+            )
+        if self.posture.shape != (self.robot.nq,):
+            raise InputError(
+                f"The posture has shape {self.posture.shape}; ({self.robot.nq},) is right, as "
+                "`Robot.configuration` makes it."
+            )
+        require_within_limits(self.robot, self.posture)
+        if self.contacts and not self.robot.floating_base:
+            raise InputError(
+                "The robot's base is fixed, but contacts hold frames to the ground as well; leave "
+                "them out, or load the robot with a floating base."
+            )
+        for contact in self.contacts:
+            self.robot.check_frame(contact.frame)
+        self.law.gain(self.robot)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Every file that it was read from; none of these may be overwritten."""
+        if self.source is None:
+            return (self.robot.urdf_path,)
+        return self.source.files
+
+    @property
+    def text(self) -> str:
+        """The project file's text; empty if it was built in Python."""
+        return "" if self.source is None else self.source.text
+
+    @property
+    def motion_file(self) -> Path | None:
+        """The project's own motion, if it names one."""
+        return None if self.source is None else self.source.motion_file
 
     def still(self) -> Motion:
         """Return the posture as a motion of one instant."""
@@ -95,8 +136,8 @@ class System:
             contact_index=np.zeros(1, dtype=np.int64),
         )
 
-    def evaluate(self, motion: Motion) -> WholeBodyStack:
-        """Return the controller's matrices along a motion.
+    def spaces(self, motion: Motion | None = None) -> Spaces:
+        """Return the law's matrices along a motion; at the posture if None.
 
         Args:
             motion: its instants.
@@ -104,41 +145,96 @@ class System:
         Raises:
             RobotError: a mass matrix is not positive definite.
         """
-        return evaluate(
-            self.robot,
-            self.hierarchy,
-            self.actuators,
-            motion=motion,
-            feedback=self.feedback,
-            gravity=self.gravity,
-            task_error=self.task_error,
-        )
+        return spaces_along(self.robot, self.law, self.actuators, motion or self.still())
 
-    def frozen(self, motion: Motion, stack: WholeBodyStack, instant: int) -> Linearisation:
-        """Return the closed loop of the law that is run, frozen at one instant.
+    def rest(self, motion: Motion | None = None, instant: int = 0) -> Rest:
+        """Return where the loop rests while it holds an instant of a motion, or the posture.
 
         Args:
-            motion: its instants.
-            stack: the controller's matrices along it.
+            motion: its instants; the posture if None.
             instant: which one.
         """
-        q, contacts = motion.q[instant], motion.contact_sets[motion.contact_index[instant]]
-        passive = passive_stiffness(
+        q, contacts = self._held(motion, instant)
+        return rest_of(self.robot, self.law, self.actuators, q, contacts=contacts)
+
+    def in_posture(self, motion: Motion | None = None, instant: int = 0) -> Rest:
+        """Return the loop's state in an instant's configuration: tasks without error, springs
+        that carry gravity.
+
+        Args:
+            motion: its instants; the posture if None.
+            instant: which one.
+        """
+        q, contacts = self._held(motion, instant)
+        return posture_of(self.robot, self.law, self.actuators, q, contacts=contacts)
+
+    def frozen(
+        self, motion: Motion | None = None, instant: int = 0, *, rest: Rest | None = None
+    ) -> FrozenLoop:
+        """Return the closed loop of the law that runs, where it rests.
+
+        Args:
+            motion: its instants; the posture if None.
+            instant: which one.
+            rest: where the loop rests, if that is known already.
+
+        Raises:
+            ContractionError: q̄(θ) is fed back and does not exist.
+        """
+        q, contacts = self._held(motion, instant)
+        return freeze(
             self.robot,
-            self.hierarchy,
-            self.actuators,
-            q=q,
-            contacts=contacts,
-            feedback=self.feedback,
-            gravity=self.gravity,
-            task_error=self.task_error,
-        )
-        return linearise(
-            self.robot,
+            self.law,
             self.actuators,
             q,
             contacts=contacts,
-            F=stack.F_theta[instant],
-            feedback=self.feedback,
-            F_passive=passive,
+            rest=self.rest(motion, instant) if rest is None else rest,
+            embedded_delay=self.delays.torque_feedback_delay,
         )
+
+    @property
+    def ideal_drives(self) -> bool:
+        """Whether every drive gives at once the torque that it is asked for, and no torque feedback
+        comes late."""
+        return not (np.isfinite(self.actuators.torque_bandwidth).any() or self.late_joints)
+
+    @property
+    def late_joints(self) -> tuple[str, ...]:
+        """Joints whose drives feed back a late torque; with B_s = B there is no feedback."""
+        if not self.delays.torque_feedback_delay:
+            return ()
+        fed_back = self.actuators.inertia_shaping != 1.0
+        return tuple(np.array(self.robot.joints)[fed_back].tolist())
+
+    def controller(
+        self,
+        posture: ArrayLike | None = None,
+        *,
+        reference: Callable[[float], tuple[Array, Array]] | None = None,
+    ) -> Controller:
+        """Return the controller that runs the law.
+
+        Args:
+            posture: (nq,) configuration that it holds; the system's if None.
+            reference: offset (m,) of the references and its rate (m,) at a time.
+        """
+        return Controller(
+            self.robot,
+            self.law,
+            self.actuators,
+            contacts=self.contacts,
+            posture=self.posture if posture is None else posture,
+            delay_bound=self.delays.d_1,
+            reference=reference,
+        )
+
+    def simulate(self, **choices: Any) -> "Run":
+        """Run the controller on the delayed robot; see `sealag.simulate` for the choices."""
+        from sealag.design._simulate import simulate
+
+        return simulate(self, **choices)
+
+    def _held(self, motion: Motion | None, instant: int) -> tuple[Array, tuple[Contact, ...]]:
+        if motion is None:
+            return self.posture, self.contacts
+        return motion.q[instant], motion.contact_sets[motion.contact_index[instant]]

@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 
 from sealag.kernels import dynamics
+from sealag.kernels.dense import multiply
 from sealag.kernels.operational_space import divide, memory_size, operational_space, task_torque
 from sealag.kernels.rigid import integrate
 
@@ -173,15 +174,39 @@ def _turn_about(R_wanted, R, cosine, angle, out):
 
 
 @njit(cache=True)
-def static_step(J_star, stiffness, K, torque, sag, work, step):
+def gravity_slope(tree, terms, along, H, work, out):
+    """Write ∂ḡ/∂q_j along the contact-consistent motions, with these motions frozen: Wᵀ H W.
+
+    Args:
+        tree: as in `law`.
+        terms: as `law` left them.
+        along: (nv, n) W.
+        H: (nv, nv) scratch.
+        work: (nv, n) scratch.
+        out: (n, n) Nm/rad, written.
+    """
+    dynamics.gravity_gradient(tree, terms, H)
+    multiply(H, along, work)
+    nv, n = along.shape
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for k in range(nv):
+                total += along[k, i] * work[k, j]
+            out[i, j] = total
+
+
+@njit(cache=True)
+def static_step(J_star, stiffness, slope, K, torque, sag, work, step):
     """One Newton step towards K (θ − q̄) = l(q̄), Eqs. (15), (16), with sag = q̄ − θ.
 
-    (K − J*ᵀ S J*) δ = −K sag − l by elimination; then sag ← sag + δ. Where the fixed point is a
-    contraction every pivot is positive, and where S is symmetric the converse holds too.
+    (K − J*ᵀ S J* + ∂ḡ/∂q) δ = −K sag − l by elimination; then sag ← sag + δ. Where the fixed point
+    is a contraction every pivot is positive.
 
     Args:
         J_star: (m, n).
         stiffness: (m, m) S.
+        slope: (n, n) ∂ḡ/∂q of the gravity compensation, 0 if it is not fed back.
         K: (n,) spring stiffness.
         torque: (n,) l at θ + sag.
         sag: (n,), moved.
@@ -192,7 +217,7 @@ def static_step(J_star, stiffness, K, torque, sag, work, step):
         False if a pivot is not positive: the task is stiffer than the springs.
     """
     m, n = J_star.shape
-    work[:, :] = 0.0
+    work[:, :] = slope
     for r in range(m):
         for s in range(m):
             entry = stiffness[r, s]
@@ -224,7 +249,7 @@ def warm() -> None:
     """Compile every kernel of this module."""
     leave_to_higher(np.zeros((1, 2)), np.zeros((1, 2)), np.array([0, 1]), np.zeros(1), np.zeros(2))
     J, S, K = np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1)
-    static_step(J, S, K, np.zeros(1), np.zeros(1), np.zeros((1, 1)), np.zeros(1))
+    static_step(J, S, J, K, np.zeros(1), np.zeros(1), np.zeros((1, 1)), np.zeros(1))
     nv, c, m = 7, 3, 1
     (tree, terms), one, row = dynamics.example(nv), np.zeros(1), np.zeros((1, 3), np.int64)
     mounts = np.ones(1, np.int64), np.eye(3)[None], np.zeros((1, 3)), np.ones((1, nv), np.int64)
@@ -233,6 +258,8 @@ def warm() -> None:
     rows[:, 1] = np.arange(c)
     q = np.zeros(8)
     q[6] = 1.0
+    wide = np.zeros((nv, 1))
+    gravity_slope(tree, terms, wide, np.zeros((nv, nv)), wide.copy(), np.zeros((1, 1)))
     law(
         tree, terms, (*mounts, *placed), (rows, row, np.arange(2), placed[1], placed[2], one),
         (np.eye(m), one, 0, False, 1e-9, True, False), (q, one, np.zeros((nv, 1)), one),

@@ -1,5 +1,6 @@
 """Terms of a tree of rigid bodies at one configuration and velocity.
 
+A joint may follow another one's coordinate: its rate is then a constant multiple of that one's.
 Everything is in world axes about one point that is at rest in the world and where the first joint
 is now, so that no body needs axes of its own and no precision is lost far from the world's origin.
 Spatial vectors are linear first. Configurations and velocities are laid out as in ``rigid``.
@@ -22,17 +23,19 @@ def allocate(joint):
         joint: as in `evaluate`.
 
     Returns:
-        Mass matrix M (nv, nv); Coriolis, centrifugal and gravity torques (nv,); the velocity that
-        each joint rate gives to what moves with it (nv, 6); of every joint its rotation (N, 3, 3),
+        Mass matrix M (nv, nv); Coriolis, centrifugal and gravity torques (nv,); the velocity that a
+        coordinate's rate gives to what moves with each of the D degrees of freedom of the tree
+        (D, 6); of every joint its rotation (N, 3, 3),
         position in the world (N, 3), velocity (N, 6) and, less gravity's, acceleration at zero v̇
         (N, 6); position, velocity, and acceleration at zero v̇ of the centre of mass (3, 3) and its
         Jacobian (3, nv); momentum, linear and angular about the centre of mass (6,); kinetic
         energy and gravity potential (2,).
     """
     count = len(joint)
-    nv = sum(6 if kind == FREE else 1 for kind in joint[1:, 0])
+    columns = sum(6 if kind == FREE else 1 for kind in joint[1:, 0])
+    nv = columns - int((joint[:, 2] != joint[:, 3]).sum())
     return (
-        np.zeros((nv, nv)), np.zeros(nv), np.zeros((nv, 6)), np.tile(np.eye(3), (count, 1, 1)),
+        np.zeros((nv, nv)), np.zeros(nv), np.zeros((columns, 6)), np.tile(np.eye(3), (count, 1, 1)),
         np.zeros((count, 3)), np.zeros((count, 6)), np.zeros((count, 6)), np.zeros((3, 3)),
         np.zeros((3, nv)), np.zeros(6), np.zeros(2),
     )  # fmt: skip
@@ -44,15 +47,17 @@ def evaluate(tree, q, v, terms):
 
     Args:
         tree: what the robot is made of; row 0 is the world, parents come before their children.
-            joint (N, 3) kind, parent and first velocity; place (N, 12) rotation and position in
-            the parent joint's axes; axis (N, 3) unit vector in the joint's axes; body (N, 13)
-            mass, centre of mass and inertia about it in the joint's axes; and the entries of a
-            configuration less those of a velocity.
+            joint (N, 4) kind, parent, first degree of freedom of the tree and first coordinate,
+            the same unless the joint follows that coordinate; place (N, 12) rotation and position
+            in the parent joint's axes; axis (N, 3) unit vector in the joint's axes; body (N, 13)
+            mass, centre of mass and inertia about it in the joint's axes; gear (N, 2) multiplier
+            and offset of the coordinate; and the entries of a configuration less those of a
+            velocity.
         q: (nq,) configuration.
         v: (nv,) velocity.
         terms: as `allocate` returns them, written.
     """
-    joint, place, axis, body, shift = tree
+    joint, place, axis, body, gear, shift = tree
     M, nle, J, R, p, twist, rate, com, com_jacobian, momentum, energy = terms
     count = joint.shape[0]
     inertia, force, flow = np.zeros((count, _INERTIA)), np.zeros((count, 6)), np.zeros((count, 6))
@@ -60,11 +65,12 @@ def evaluate(tree, q, v, terms):
     rate[0, 2] = GRAVITY
     J[:] = 0.0
     for j in range(1, count):
-        kind, parent, first = joint[j, 0], joint[j, 1], joint[j, 2]
-        _turn(kind, axis, q, j, 3 if kind == FREE else first + shift, turn)
-        _place(kind, parent, place, axis, q, j, first + shift, turn, work, R, p)
-        _columns(kind, first, axis, R, p, j, J)
-        _move(parent, first, 6 if kind == FREE else 1, J, v, j, u, twist, rate)
+        kind, parent, first, at = joint[j, 0], joint[j, 1], joint[j, 2], joint[j, 3]
+        position = gear[j, 0] * q[at + shift] + gear[j, 1]
+        _turn(kind, axis, q, j, position, turn)
+        _place(kind, parent, place, axis, q, j, position, turn, work, R, p)
+        _columns(kind, first, axis, gear[j, 0], R, p, j, J)
+        _move(parent, first, at, 6 if kind == FREE else 1, J, v, j, u, twist, rate)
         _weigh(body, R, p, j, work, inertia)
         _times(inertia, twist, j, j, flow)
         _times(inertia, rate, j, j, force)
@@ -80,12 +86,12 @@ def evaluate(tree, q, v, terms):
 
 
 @njit(cache=True)
-def _turn(kind, axis, q, j, entry, turn):
-    """Write the rotation (3, 3) that the entries of q from ``entry`` on make."""
+def _turn(kind, axis, q, j, position, turn):
+    """Write the rotation (3, 3) of joint j, whose position is an angle, or the base's q[3:7]."""
     if kind == FREE:
-        x, y, z, w = q[entry], q[entry + 1], q[entry + 2], q[entry + 3]
+        x, y, z, w = q[3], q[4], q[5], q[6]
     else:
-        angle = q[entry] if kind == REVOLUTE else 0.0
+        angle = position if kind == REVOLUTE else 0.0
         s = math.sin(0.5 * angle)
         x, y, z, w = s * axis[j, 0], s * axis[j, 1], s * axis[j, 2], math.cos(0.5 * angle)
     turn[0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -97,7 +103,7 @@ def _turn(kind, axis, q, j, entry, turn):
 
 
 @njit(cache=True)
-def _place(kind, parent, place, axis, q, j, entry, turn, fixed, R, p):
+def _place(kind, parent, place, axis, q, j, position, turn, fixed, R, p):
     """Write rotation and position of joint j."""
     for a in range(3):
         p[j, a] = p[parent, a]
@@ -112,14 +118,14 @@ def _place(kind, parent, place, axis, q, j, entry, turn, fixed, R, p):
             if kind == FREE:
                 p[j, a] += fixed[a, b] * q[b]
             elif kind == PRISMATIC:
-                p[j, a] += fixed[a, b] * axis[j, b] * q[entry]
+                p[j, a] += fixed[a, b] * axis[j, b] * position
             for c in range(3):
                 R[j, a, b] += fixed[a, c] * turn[c, b]
 
 
 @njit(cache=True)
-def _columns(kind, first, axis, R, p, j, J):
-    """Write what the rates of joint j move its body with."""
+def _columns(kind, first, axis, ratio, R, p, j, J):
+    """Write the columns of joint j's Jacobian, ratio times those of its own rate."""
     x, y, z = p[j, 0] - p[1, 0], p[j, 1] - p[1, 1], p[j, 2] - p[1, 2]
     for k in range(3 if kind == FREE else 1):
         c = first + 3 + k if kind == FREE else first
@@ -129,7 +135,7 @@ def _columns(kind, first, axis, R, p, j, J):
                 J[first + k, a] = along
             else:
                 along = R[j, a, 0] * axis[j, 0] + R[j, a, 1] * axis[j, 1] + R[j, a, 2] * axis[j, 2]
-            J[c, a if kind == PRISMATIC else 3 + a] = along
+            J[c, a if kind == PRISMATIC else 3 + a] = ratio * along
         if kind != PRISMATIC:
             J[c, 0] = y * J[c, 5] - z * J[c, 4]
             J[c, 1] = z * J[c, 3] - x * J[c, 5]
@@ -146,12 +152,12 @@ def _add_cross(A, at, b, of, j, out, to):
 
 
 @njit(cache=True)
-def _move(parent, first, size, J, v, j, own, twist, rate):
+def _move(parent, first, at, size, J, v, j, own, twist, rate):
     """Write velocity and acceleration at zero v̇ of joint j."""
     for k in range(6):
         own[k] = 0.0
-        for c in range(first, first + size):
-            own[k] += J[c, k] * v[c]
+        for c in range(size):
+            own[k] += J[first + c, k] * v[at + c]
         twist[j, k] = twist[parent, k] + own[k]
         rate[j, k] = rate[parent, k]
     _add_cross(twist, 3, own, 0, j, rate, 0)
@@ -200,24 +206,26 @@ def _times(I, u, j, c, out):
 def _gather(joint, inertia, force, flow, J, M, nle, com_jacobian):
     """Write M, nle and the centre of mass's Jacobian times the mass, from the leaves inwards."""
     push = np.empty((joint.shape[0], 6))
-    M[:] = 0.0
+    M[:], nle[:], com_jacobian[:] = 0.0, 0.0, 0.0
     for j in range(joint.shape[0] - 1, 0, -1):
-        kind, parent, first = joint[j, 0], joint[j, 1], joint[j, 2]
+        kind, parent, first, shift = joint[j, 0], joint[j, 1], joint[j, 2], joint[j, 3]
+        shift -= first
         for c in range(first, first + 6 if kind == FREE else first + 1):
             _times(inertia, J, j, c, push)
             for a in range(3):
-                com_jacobian[a, c] = push[j, a]
-            nle[c] = 0.0
+                com_jacobian[a, c + shift] += push[j, a]
             for k in range(6):
-                nle[c] += J[c, k] * force[j, k]
+                nle[c + shift] += J[c, k] * force[j, k]
             i, start, end = j, first, c + 1
             while i > 0:
                 for d in range(start, end):
                     s = 0.0
                     for k in range(6):
                         s += J[d, k] * push[j, k]
-                    M[c, d] = s
-                    M[d, c] = s
+                    of = d + joint[i, 3] - joint[i, 2]
+                    M[c + shift, of] += s
+                    if d != c:
+                        M[of, c + shift] += s
                 i = joint[i, 1]
                 start = joint[i, 2]
                 end = start + 6 if joint[i, 0] == FREE else start + 1
@@ -281,25 +289,72 @@ def frames(terms, mounts, J, R, p, bias):
         bias[f, 0] += y * u[2] - z * u[1]
         bias[f, 1] += z * u[0] - x * u[2]
         bias[f, 2] += x * u[1] - y * u[0]
+        J[f] = 0.0
         for k in range(columns.shape[0]):
             if support[f, k] == 0:
-                J[f, :, k] = 0.0
                 continue
+            c = support[f, k] - 1
             x, y, z = columns[k, 3], columns[k, 4], columns[k, 5]
-            J[f, 0, k] = columns[k, 0] + y * t - z * s
-            J[f, 1, k] = columns[k, 1] + z * r - x * t
-            J[f, 2, k] = columns[k, 2] + x * s - y * r
-            J[f, 3, k], J[f, 4, k], J[f, 5, k] = x, y, z
+            J[f, 0, c] += columns[k, 0] + y * t - z * s
+            J[f, 1, c] += columns[k, 1] + z * r - x * t
+            J[f, 2, c] += columns[k, 2] + x * s - y * r
+            J[f, 3, c] += x
+            J[f, 4, c] += y
+            J[f, 5, c] += z
+
+
+@njit(cache=True)
+def gravity_gradient(tree, terms, H):
+    """Write how the gravity torque changes with the configuration, ∂²V/∂q².
+
+    Moving joint d turns everything behind it, as if gravity turned the other way: for c behind d,
+    H_cd = m g (ω_d × e_z) · (-v), ω_d the rate of joint d and m v the momentum of what moves behind
+    c at its rate. Among the base's own directions H is the symmetric part of that.
+
+    Args:
+        tree: as in `evaluate`.
+        terms: as `evaluate` wrote them.
+        H: (nv, nv) Nm/rad, written.
+    """
+    joint, body = tree[0], tree[3]
+    J, R, p = terms[2], terms[3], terms[4]
+    weight, moment = np.zeros(joint.shape[0]), np.zeros((joint.shape[0], 3))
+    H[:] = 0.0
+    for j in range(joint.shape[0] - 1, 0, -1):
+        kind, parent, first, shift = joint[j, 0], joint[j, 1], joint[j, 2], joint[j, 3]
+        shift -= first
+        weight[j] += GRAVITY * body[j, 0]
+        for a in range(3):
+            c = p[j, a] - p[1, a]
+            for b in range(3):
+                c += R[j, a, b] * body[j, 1 + b]
+            moment[j, a] += GRAVITY * body[j, 0] * c
+        size = 6 if kind == FREE else 1
+        for c in range(first, first + size):
+            x = weight[j] * J[c, 0] + J[c, 4] * moment[j, 2] - J[c, 5] * moment[j, 1]
+            y = weight[j] * J[c, 1] + J[c, 5] * moment[j, 0] - J[c, 3] * moment[j, 2]
+            i = j
+            while i > 0:
+                start, part = joint[i, 2], 0.5 if i == j else 1.0
+                for d in range(start, start + 6 if joint[i, 0] == FREE else start + 1):
+                    of = d + joint[i, 3] - start
+                    value = part * (J[d, 3] * y - J[d, 4] * x)
+                    H[c + shift, of] += value
+                    H[of, c + shift] += value
+                i = joint[i, 1]
+        weight[parent] += weight[j]
+        for a in range(3):
+            moment[parent, a] += moment[j, a]
 
 
 def example(nv):
     """Return a tree of a free body and nv - 6 joints, and its terms, to compile kernels with."""
     count = 2 + nv - 6
-    joint, body = np.zeros((count, 3), np.int64), np.zeros((count, 13))
-    joint[1, 0], joint[2:, 1], joint[2:, 2] = FREE, 1, 6 + np.arange(nv - 6)
-    place, axis = np.zeros((count, 12)), np.zeros((count, 3))
+    joint, body = np.zeros((count, 4), np.int64), np.zeros((count, 13))
+    joint[1, 0], joint[2:, 1], joint[2:, 2:] = FREE, 1, 6 + np.arange(nv - 6)[:, None]
+    place, axis, gear = np.zeros((count, 12)), np.zeros((count, 3)), np.tile([1.0, 0.0], (count, 1))
     place[:, [0, 4, 8]], axis[:, 2], body[:, [0, 4, 8, 12]] = 1.0, 1.0, 1.0
-    return (joint, place, axis, body, 1), allocate(joint)
+    return (joint, place, axis, body, gear, 1), allocate(joint)
 
 
 def warm() -> None:
@@ -308,6 +363,7 @@ def warm() -> None:
     q, v = np.zeros(8), np.zeros(7)
     q[6] = 1.0
     evaluate(tree, q, v, terms)
+    gravity_gradient(tree, terms, np.zeros((7, 7)))
     mounts = (np.ones(1, np.int64), np.eye(3)[None], np.zeros((1, 3)), np.ones((1, 7), np.int64))
     J, R, p, bias = np.zeros((1, 6, 7)), np.zeros((1, 3, 3)), np.zeros((1, 3)), np.zeros((1, 6))
     frames(terms, mounts, J, R, p, bias)

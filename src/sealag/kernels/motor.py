@@ -19,6 +19,7 @@ from numba import njit
 
 SIZE = 9
 PRODUCTS = 5
+ANGLE, SPEED, TORQUE, LINK, LINK_SPEED, COMMAND = 0, 1, 2, 3, 4, 7  # places in z
 REGULAR, LIMITED, LOCKED = 0, 1, 2  # LOCKED adds to the other two
 _TERMS = 12
 _MOVING = 6  # entries of z that change by themselves; the others are constants of the step

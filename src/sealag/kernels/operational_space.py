@@ -102,7 +102,7 @@ def _factor(A, L, left):
         for i in range(1, n):
             if left[i] > left[p]:
                 p = i
-        if not left[p] > _ROUNDING * trace:
+        if not left[p] > _ROUNDING * max(trace, 0.0):
             return r, trace
         L[r] = A[p]
         for k in range(r):

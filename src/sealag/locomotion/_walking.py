@@ -7,14 +7,19 @@ import numpy as np
 from sealag.actuation import Actuators
 from sealag.errors import InputError, SolverError
 from sealag.locomotion._terrain import Terrain
-from sealag.locomotion._walking_options import Prediction, WalkingGait, WalkingOptions
+from sealag.locomotion._walking_options import (
+    JointAngles,
+    Prediction,
+    WalkingGait,
+    WalkingOptions,
+)
 from sealag.locomotion._walking_placement import Placement
 from sealag.locomotion._walking_start import walking_start
 from sealag.locomotion._walking_state import Body, Estimator
 from sealag.locomotion._walking_step import StepReferences
 from sealag.robot import Robot
 from sealag.typing import Array
-from sealag.whole_body import Feedback, Measurement
+from sealag.whole_body import Measurement
 
 _DAMPING = 1e-9  # share of the trace: bounds torques near a straight knee
 _LATE_SWING = 0.6  # share of the step after which a touch is a touchdown
@@ -169,9 +174,9 @@ class WalkingController:
         """Estimate and predict the state, and evaluate the robot's terms there."""
         options, body, stiffness = self.options, self._body, self._actuators.spring_stiffness
         body.q[:], body.v[:] = measurement.q, measurement.v
-        if options.feedback == Feedback.MOTOR:
+        if options.feedback == JointAngles.MOTOR:
             body.q[-6:] = measurement.theta
-        elif options.feedback == Feedback.STATIC_JOINT:
+        elif options.feedback == JointAngles.STATIC_JOINT:
             body.q[-6:] = measurement.theta - self.tau_task / stiffness
         self._estimator.move(
             body, self.step, theta=measurement.theta, theta_dot=measurement.theta_dot,

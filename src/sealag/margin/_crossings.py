@@ -1,21 +1,21 @@
-"""Crossings of the imaginary axis, refined to rounding from the bands that the sweep left."""
+"""Crossings of the imaginary axis, refined to rounding from what the search left."""
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from sealag.margin._loop import Loop, Transfer
-from sealag.margin._sweep import Cluster, slow_limit
+from sealag.margin._family import Curve, Family
+from sealag.margin._loop import Loop, exact_determinant, rational
+from sealag.margin._pictures import Picture
+from sealag.margin._search import Band, Passage
 from sealag.typing import Array
 
-_ON_LINE = 1e-5
-_SLOW = 1e-6
-_STEPS = 30
-_EXACT = 1e-12
-_STATIC = 1e-8
-_APART = 1e-2
-_REACH = 1e-4
+_TOUCHING = 1e-6
+_STEPS = 40
+_SAME = 1e-11
+_ON_AXIS = 1e-7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,8 @@ class Crossing:
         direction: +1 when the root leaves the left half-plane as the delay grows, −1 when it
             enters, 0 when it touches the axis.
         mode: (states,) complex eigenvector over the states, its largest entry 1.
-        residual: smallest singular value of jωI − A_0 − A_1 e^{-jωd} over the loop's norm.
+        residual: length of (jω − A_0 − A_1 e^{-jωd} − A_e e^{-jωe}) applied to the balanced unit
+            mode, over the loop's norm.
     """
 
     delay: float
@@ -43,139 +44,299 @@ class Crossing:
         return 2.0 * math.pi / self.frequency
 
 
-def crossings_in(transfer: Transfer, bands: list[Cluster]) -> tuple[list[Crossing], bool]:
-    """Refine what the sweep left.
+class Found(NamedTuple):
+    """What a passage or a band turned out to hold.
+
+    Attributes:
+        crossings: crossings at positive frequency.
+        explained: whether a crossing, or its proven absence, explains it.
+        decided: whether no contact at zero frequency was left open by rounding.
+    """
+
+    crossings: list[Crossing]
+    explained: bool
+    decided: bool
+
+
+class _Point(NamedTuple):
+    """A solution of P(jω, φ) v = 0, with how the root moves by φ."""
+
+    phi: float
+    omega: float
+    slope: complex
+    mode: Array
+    residual: float
+
+
+def crossings_of(picture: Picture, passages: list[Passage], bands: list[Band]) -> Found:
+    """Refine what the search left.
 
     Args:
-        transfer: G about its reference.
-        bands: bands of frequencies from the sweep.
+        picture: the parameter that was searched over.
+        passages: parts in which some eigenvalues each meet the axis at most once.
+        bands: bands too narrow to split.
 
     Returns:
-        The crossings by delay, and whether every band is explained by one of them.
+        The crossings by delay, each once, and what is left open.
     """
-    found: list[Crossing] = []
-    explained = True
+    parts = [_in_passage(picture, one, curve) for one in passages for curve in one.curves]
+    single = _once([item for part in parts for item in part.crossings])
     for band in bands:
-        if _touches_at_zero(transfer, band):
-            continue
-        middle = (band.lower + band.upper) / 2.0
-        nu = np.linalg.eigvals(transfer.reference * transfer.near(middle)[0])
-        starts = nu[_near_line(nu, _ON_LINE)]
-        reach = _REACH * middle + 2.0 * (band.upper - band.lower)
-        here = [_refine(transfer, middle, nu=value, reach=reach) for value in starts]
-        refined = [crossing for crossing in here if crossing is not None]
-        found += refined
-        explained &= bool(here) and len(refined) == len(here)
-    return sorted(found, key=lambda crossing: crossing.delay), explained
-
-
-def _touches_at_zero(transfer: Transfer, band: Cluster) -> bool:
-    """Whether a band is a contact at zero frequency itself, which no finite delay reaches.
-
-    A_0 + z A_1 is then singular for a z ≠ 1 of modulus 1, and the band lies far below every pole.
-    """
-    if band.upper > 1.1 * slow_limit(transfer):
-        return False
-    nu = np.linalg.eigvals(transfer.reference * transfer.near(0.0)[0])
-    z = transfer.reference * (1.0 + 1.0 / nu[_near_line(nu, _STATIC)])
-    return bool(len(z)) and bool((np.abs(np.angle(z)) > _APART).all())
-
-
-def _near_line(nu: Array, tolerance: float) -> Array:
-    """Eigenvalues whose delay factor has modulus 1 to a tolerance: |z| − 1 ≈ (Re ν + ½)/|ν|²."""
-    return np.abs(nu.real + 0.5) < tolerance * np.maximum(np.abs(nu) ** 2, np.abs(nu))
-
-
-def _refine(transfer: Transfer, omega: float, *, nu: complex, reach: float) -> Crossing | None:
-    """Newton's method on Re(z_0 ν(ω)) = −½; where the root only touches, on its slope."""
-    start, best = omega, (math.inf, omega, nu, 0j)
-    for _ in range(_STEPS):
-        value, slope = _track(transfer, omega, nu=nu)
-        miss = value.real + 0.5
-        if abs(miss) < best[0]:
-            best = (abs(miss), omega, value, slope)
-        elif abs(miss) < _EXACT * abs(value):
-            break
-        rate = (1j * slope).real
-        if abs(miss) < 4e-16 * abs(value) or rate == 0.0:
-            break
-        step = float(np.clip(miss / rate, -reach, reach))
-        if omega - step == omega:
-            break
-        omega, nu = omega - step, value - 1j * slope * step
-    _, omega, value, slope = best
-    if _turn(value, slope) == 0:
-        omega, value, slope = _nearest(transfer, omega, nu=value)
-    if abs(omega - start) > reach or not _near_line(np.array([value]), _ON_LINE)[0]:
-        return None
-    return _crossing(transfer, omega, value=value, slope=slope)
-
-
-def _nearest(transfer: Transfer, omega: float, *, nu: complex) -> tuple[float, complex, complex]:
-    """Secant method on the slope of Re(z_0 ν): the frequency where a touching root touches."""
-    other = omega * (1.0 + 1e-6)
-    value, slope = _track(transfer, omega, nu=nu)
-    rate, rate_other = (1j * slope).real, (1j * _track(transfer, other, nu=nu)[1]).real
-    for _ in range(_STEPS):
-        if rate == rate_other or abs(other - omega) <= 1e-13 * omega:
-            break
-        new = omega - rate * (omega - other) / (rate - rate_other)
-        if not abs(new - omega) <= _REACH * omega:
-            break
-        other, rate_other, omega = omega, rate, new
-        value, slope = _track(transfer, omega, nu=value)
-        rate = (1j * slope).real
-    return omega, value, slope
-
-
-def _turn(value: complex, slope: complex) -> int:
-    """Sign of Re(dλ/dd), which is the same for every k in d = (φ + 2πk)/ω.
-
-    From ν (z − z_0) = 1 and z = e^{-λd}, with ν here z_0 ν, it is that of
-    Im((dν/dλ) / (ν (ν + 1))).
-    """
-    rise = slope / (value * (value + 1.0)) * -1j
-    if abs(rise.real) < _SLOW * abs(rise):
-        return 0
-    return int(math.copysign(1.0, rise.real))
-
-
-def _track(transfer: Transfer, omega: float, *, nu: complex) -> tuple[complex, complex]:
-    """Eigenvalue of z_0 G nearest to nu, and its derivative by λ = jω."""
-    G, derivative = transfer.near(omega)
-    values, X = np.linalg.eig(transfer.reference * G)
-    at = int(np.abs(values - nu).argmin())
-    try:
-        left = np.linalg.inv(X)[at]
-    except np.linalg.LinAlgError:
-        return complex(values[at]), 0j
-    return complex(values[at]), complex(transfer.reference * (left @ derivative @ X[:, at]))
-
-
-def _crossing(transfer: Transfer, omega: float, *, value: complex, slope: complex) -> Crossing:
-    z_0 = transfer.reference
-    z = z_0 * (1.0 + 1.0 / value)
-    angle = -math.atan2(z.imag, z.real) % (2.0 * math.pi)
-    delay, omega = float(angle / omega), float(omega)
-    mode, residual = mode_at(transfer.loop, omega, delay)
-    return Crossing(
-        delay=delay, frequency=omega, direction=_turn(value, slope), mode=mode, residual=residual
+        part = _in_band(picture, band)
+        parts.append(part)
+        single += [one for one in part.crossings if not any(_same(one, two) for two in single)]
+    return Found(
+        crossings=sorted(single, key=lambda crossing: crossing.delay),
+        explained=all(part.explained for part in parts),
+        decided=all(part.decided for part in parts),
     )
 
 
-def mode_at(loop: Loop, omega: float, delay: float) -> tuple[Array, float]:
-    """Null vector of the characteristic matrix at jω.
+def _once(crossings: list[Crossing]) -> list[Crossing]:
+    """Leave out what two parts found at the end that they share."""
+    kept: list[Crossing] = []
+    for one in crossings:
+        if not any(_same(one, two) for two in kept):
+            kept.append(one)
+    return kept
 
-    Args:
-        loop: the loop.
-        omega: frequency, rad/s.
-        delay: delay, s.
 
-    Returns:
-        The mode over the user's states with largest entry 1, and the relative residual.
+def _same(one: Crossing, two: Crossing) -> bool:
+    near = abs(one.frequency - two.frequency) <= _SAME * one.frequency
+    return near and abs(one.delay - two.delay) * one.frequency <= 100.0 * _SAME
+
+
+def _in_passage(picture: Picture, part: Passage, curve: Curve) -> Found:
+    """The crossing of one curve, if it meets the axis in its part at all."""
+    family, k = part.family, curve.index
+    value = family.values[k]
+    if curve.even:
+        blur = family.blur[k, k]
+        if abs(value.real) <= blur:
+            return _at_rest(picture, part, curve)
+        if curve.offset < 0.0:
+            return Found([], explained=True, decided=True)
+    mirrored = curve.even and family.centre > part.lower
+    signs = [_side(picture, part, curve, at) for at in (part.lower, part.upper)]
+    if signs[0] * signs[1] > 0.0:
+        return Found([], explained=True, decided=True)
+    start = family.centre + (-curve.offset if mirrored else curve.offset)
+    start = min(max(start, part.lower), part.upper)
+    expected = value + (start - family.centre) * family.motion[k, k]
+    phi, omega = picture.place(start, complex(1j * expected.imag))
+    point = _newton(picture.loop, phi, omega, left=family.left[k], right=family.right[:, k])
+    if point is not None and _belongs(picture, part, curve, point):
+        return _reported(picture.loop, point, touching=False)
+    return Found([], explained=False, decided=False)
+
+
+def _belongs(picture: Picture, part: Passage, curve: Curve, point: _Point) -> bool:
+    """Whether a refined point is on the curve and in its part, ends included."""
+    family, k = part.family, curve.index
+    t = picture.parameter(point.phi, point.omega)
+    slack = 1e-13 * max(abs(part.lower), abs(part.upper))
+    if not part.lower - slack <= t <= part.upper + slack:
+        return False
+    placed = picture.value(point.phi, point.omega)
+    along = family.values[k] + (t - family.centre) * family.motion[k, k]
+    return bool(abs(placed - along) <= 1.01 * curve.reach)
+
+
+def _side(picture: Picture, part: Passage, curve: Curve, at: float) -> float:
+    """On which side of the axis the curve is at an end of its part; 0 where it cannot be told."""
+    family, k = part.family, curve.index
+    if curve.even and at == family.centre:
+        return math.copysign(1.0, family.values[k].real)
+    along = family.values[k] + (at - family.centre) * family.motion[k, k]
+    if not curve.even and abs(along.real) > curve.reach:
+        return math.copysign(1.0, along.real)
+    other = picture.family(at)
+    if other is None:
+        return 0.0
+    nearest = int(np.abs(other.values - along).argmin())
+    value = other.values[nearest].real
+    return math.copysign(1.0, value) if abs(value) > other.blur[nearest, nearest] else 0.0
+
+
+def _at_rest(picture: Picture, part: Passage, curve: Curve) -> Found:
+    """A real eigenvalue that rounding cannot tell from zero, at φ = 0, φ = π or ω = 0.
+
+    Where the matrix is the user's own, its determinant in rational arithmetic tells. If it is zero,
+    z = ±1 has a root at zero, no finite delay of z = −1 reaches it, and the curve, even and
+    monotone in Δ², meets the axis nowhere else. If not, the eigenvalue is the determinant over the
+    others, and Δ² = −m/b.
     """
-    factor = np.exp(-1j * omega * delay)
-    P = 1j * omega * np.eye(len(loop.A_0)) - loop.A_0 - factor * loop.A_1
-    _, values, rows = np.linalg.svd(P)
-    mode = loop.lift @ rows[-1].conj()
-    return mode / mode[np.abs(mode).argmax()], float(values[-1] / loop.size)
+    loop, family, k = picture.loop, part.family, curve.index
+    phi = picture.place(family.centre, family.values[k])[0]
+    z = 1.0 if math.cos(phi) > 0.0 else -1.0
+    if not loop.exact or z > 0.0:
+        return Found([], explained=True, decided=False)
+    determinant = exact_determinant(loop.A_0 + loop.A_e - loop.A_1)
+    if determinant == 0:
+        return Found([], explained=True, decided=True)
+    if loop.embedded:
+        return Found([], explained=True, decided=False)
+    for other in np.delete(family.values, k):
+        determinant /= rational(abs(other) if other.imag else other.real)
+    square = -float(determinant) / curve.bend
+    if square <= 0.0:
+        return Found([], explained=True, decided=True)
+    offset = math.sqrt(square)
+    omega = abs(family.motion[k, k]) * offset
+    slope = family.motion[k, k] - 2.0 * curve.bend * offset
+    if family.motion[k, k].imag > 0.0:
+        omega = -omega
+    point = _point(loop, math.pi - offset, omega, slope=slope, mode=family.right[:, k])
+    return _reported(loop, point, touching=False)
+
+
+def _in_band(picture: Picture, band: Band) -> Found:
+    """Every eigenvalue next to the axis in a band that could not be split."""
+    middle = (band.lower + band.upper) / 2.0
+    family = picture.family(middle)
+    if family is None:
+        return Found([], explained=False, decided=False)
+    half = (band.upper - band.lower) / 2.0
+    rates = np.abs(np.diagonal(family.motion).real)
+    room = 4.0 * (np.diagonal(family.blur) + 2.0 * half * rates)
+    room = np.maximum(room, _ON_AXIS * np.abs(np.diagonal(family.motion)) * max(half, 1e-8))
+    close = np.abs(family.values.real) <= room
+    if band.end:
+        close &= family.values.imag >= 0.0  # the conjugate is the mirror image
+    near = np.flatnonzero(close)
+    found: list[Crossing] = []
+    explained, decided = bool(len(near)), True
+    for k in near:
+        point = _refined(picture, family, int(k))
+        if point is None:
+            explained = False
+            continue
+        part = _reported(picture.loop, point, touching=True)
+        found += part.crossings
+        decided &= part.decided
+    return Found(found, explained=explained, decided=decided)
+
+
+def _refined(picture: Picture, family: Family, k: int) -> _Point | None:
+    """The point on the axis of one eigenvalue of a band, a crossing or a touch."""
+    phi, omega = picture.place(family.centre, complex(1j * family.values[k].imag))
+    vectors = {"left": family.left[k], "right": family.right[:, k]}
+    point = _newton(picture.loop, phi, omega, **vectors)
+    if point is None or abs(point.slope.real) < _TOUCHING * abs(point.slope):
+        point = _touch(picture.loop, phi, omega, **vectors)
+    return point
+
+
+def _reported(loop: Loop, point: _Point, *, touching: bool) -> Found:
+    """The crossing at positive frequency; at zero frequency there is none."""
+    error = 64.0 * len(loop.A_0) * np.finfo(float).eps * loop.size
+    if abs(point.omega) <= error:
+        return Found([], explained=True, decided=False)
+    turned = point.phi if point.omega > 0.0 else -point.phi
+    delay = (turned % (2.0 * math.pi)) / abs(point.omega)
+    slope = point.slope
+    flat = touching and abs(slope.real) < _TOUCHING * abs(slope)
+    direction = 0 if flat else int(math.copysign(1.0, slope.real * point.omega))
+    mode = loop.lift @ (point.mode if point.omega > 0.0 else point.mode.conj())
+    crossing = Crossing(
+        delay=float(delay),
+        frequency=float(abs(point.omega)),
+        direction=direction,
+        mode=mode / mode[np.abs(mode).argmax()],
+        residual=point.residual,
+    )
+    return Found([crossing], explained=True, decided=True)
+
+
+class _Border(NamedTuple):
+    """P v = −b g with c v = 1: g is zero where P is singular; its derivatives, and dλ/dφ."""
+
+    g: complex
+    by_root: complex
+    by_turn: complex
+    v: Array
+    slope: complex
+
+
+def _border(loop: Loop, phi: float, root: complex, *, left: Array, right: Array) -> _Border:
+    n = len(loop.A_0)
+    z = np.exp(-1j * phi)
+    P, slope = loop.characteristic(root, z)
+    K = np.zeros((n + 1, n + 1), dtype=complex)
+    K[:n, :n] = P
+    K[:n, n] = right * (loop.size / np.linalg.norm(right))
+    K[n, :n] = left * (loop.size / np.linalg.norm(left))
+    inverse = np.linalg.inv(K)
+    v, y = inverse[:n, n], inverse[n, :n]
+    by_root = complex(-(y @ slope @ v))
+    by_turn = complex(-1j * z * (y @ loop.A_1 @ v))
+    return _Border(complex(inverse[n, n]), by_root, by_turn, v, slope=-by_turn / by_root)
+
+
+def _newton(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -> _Point | None:
+    """Newton's method on g(jω, φ) = 0 in the real unknowns φ and ω."""
+    best: tuple[float, float, float, _Border] | None = None
+    try:
+        for _ in range(_STEPS):
+            border = _border(loop, phi, 1j * omega, left=left, right=right)
+            across = 1j * border.by_root
+            area = (across.conjugate() * border.by_turn).imag
+            if area == 0.0:
+                return None
+            step_phi = (across.conjugate() * -border.g).imag / area
+            step_omega = (-border.g * border.by_turn.conjugate()).imag / -area
+            moved = max(abs(step_phi), abs(step_omega) / loop.size)
+            if best is not None and not moved < best[0]:
+                break
+            best = moved, phi, omega, border
+            phi, omega = phi + step_phi, omega + step_omega
+            if moved <= 1e-16:
+                break
+    except np.linalg.LinAlgError:
+        if best is None:
+            return None
+    if best is None or best[0] > 1e-9:
+        return None
+    return _point(loop, best[1], best[2], slope=best[3].slope, mode=best[3].v)
+
+
+def _touch(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -> _Point | None:
+    """Secant method on the slope of Re λ(φ): the turn at which a root touches the axis."""
+
+    def follow(at: float, root: complex) -> tuple[complex, _Border]:
+        for _ in range(_STEPS):
+            border = _border(loop, at, root, left=left, right=right)
+            step = -border.g / border.by_root
+            root += step
+            if abs(step) <= 4e-16 * abs(root):
+                break
+        return root, border
+
+    def rate(border: _Border) -> float:
+        return border.slope.real
+
+    try:
+        root, border = follow(phi, 1j * omega)
+        other = phi + 1e-6
+        beside = rate(follow(other, root)[1])
+        for _ in range(_STEPS):
+            here = rate(border)
+            if here == beside or abs(other - phi) <= 1e-14:
+                break
+            new = phi - here * (phi - other) / (here - beside)
+            if not abs(new - phi) <= 1e-3:
+                return None
+            other, beside, phi = phi, here, new
+            root, border = follow(phi, root)
+    except np.linalg.LinAlgError:
+        return None
+    if abs(root.real) > _ON_AXIS * abs(border.slope):
+        return None
+    return _point(loop, phi, root.imag, slope=border.slope, mode=border.v)
+
+
+def _point(loop: Loop, phi: float, omega: float, *, slope: complex, mode: Array) -> _Point:
+    P = loop.characteristic(1j * omega, np.exp(-1j * phi))[0]
+    size = float(np.linalg.norm(mode)) * loop.size
+    residual = float(np.linalg.norm(P @ mode)) / size
+    return _Point(phi=phi, omega=omega, slope=slope, mode=mode, residual=residual)

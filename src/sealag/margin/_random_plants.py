@@ -4,12 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sealag.actuation import Actuators, actuators
 from sealag.errors import InputError
 from sealag.typing import Array
-from sealag.whole_body import Feedback, GravityCompensation, StiffnessForm
+from sealag.whole_body import (
+    SIGNAL_NAMES,
+    FrozenLoop,
+    GravityCompensation,
+    Signal,
+    StiffnessForm,
+    sea_loop,
+    signal_named,
+)
 
 _SYMMETRIC = 1e-9
-_FEEDBACKS = tuple(Feedback)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +38,7 @@ class SeaPlant:
         Lambda: (m, m) task inertia (J M⁻¹ Jᵀ)⁺.
         K_x: (m,) task gains, 1/s², or N/m for the form `force`.
         form: stiffness form of THEORY section 6.
-        feedback: signal that is fed back.
+        signal: what is fed back.
         gravity: `feedback` (G delayed with the rest), `planned` or `none` (no gradient).
         F: (n, n) whole delayed stiffness −∂τ_osc/∂y, Nm/rad.
         contraction: spectral radius of K⁻¹ F_q, the factor of the static joint state q̄.
@@ -48,7 +56,7 @@ class SeaPlant:
     Lambda: Array
     K_x: Array
     form: StiffnessForm
-    feedback: Feedback
+    signal: Signal
     gravity: GravityCompensation
     F: Array
     contraction: float
@@ -59,9 +67,7 @@ class SeaPlant:
     @property
     def certifiable(self) -> bool:
         """Whether the certified criterion may speak: collocated, contracting, symmetric PSD F."""
-        if self.feedback is Feedback.JOINT:
-            return False
-        if self.feedback is Feedback.STATIC_JOINT and self.contraction >= 1.0:
+        if not self.signal.has_potential or self.signal.refusal(np.array([self.contraction])):
             return False
         size = np.abs(self.F).max()
         if np.abs(self.F - self.F.T).max() > _SYMMETRIC * size:
@@ -84,7 +90,7 @@ def random_sea_plant(
     *,
     joints: int | None = None,
     form: StiffnessForm | str | None = None,
-    feedback: Feedback | str | None = None,
+    signal: Signal | str | None = None,
 ) -> SeaPlant:
     """Draw one plant: 1–6 joints, soft to stiff springs, with and without gravity.
 
@@ -95,31 +101,33 @@ def random_sea_plant(
         seed: of the generator.
         joints: number of joints, or None to draw it.
         form: stiffness form, or None to draw it.
-        feedback: signal that is fed back, or None to draw it.
+        signal: what is fed back, or its word, or None to draw it.
 
     Returns:
         The plant with its frozen loop.
 
     Raises:
-        InputError: fewer than one joint, or an unknown form or feedback.
+        InputError: fewer than one joint, or an unknown form or signal.
     """
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 7))
     drawn_form = StiffnessForm(rng.choice(list(StiffnessForm)))
-    drawn_feedback = _FEEDBACKS[rng.integers(len(_FEEDBACKS))]
+    drawn_signal = SIGNAL_NAMES[rng.integers(len(SIGNAL_NAMES))]
     if joints is not None:
         n = joints
     if n < 1:
         raise InputError(f"joints is {n}; a plant has at least one.")
     try:
         kind = drawn_form if form is None else StiffnessForm(form)
-        signal = drawn_feedback if feedback is None else Feedback(feedback)
     except ValueError as problem:
         raise InputError(f"{problem}.") from None
-    return _plant(rng, n, kind=kind, signal=signal)
+    chosen = drawn_signal if signal is None else signal
+    return _plant(
+        rng, n, kind=kind, signal=signal_named(chosen) if isinstance(chosen, str) else chosen
+    )
 
 
-def _plant(rng: np.random.Generator, n: int, *, kind: StiffnessForm, signal: Feedback) -> SeaPlant:
+def _plant(rng: np.random.Generator, n: int, *, kind: StiffnessForm, signal: Signal) -> SeaPlant:
     X = rng.normal(size=(n, n))
     M = X @ X.T + 0.1 * np.eye(n)
     m = n if rng.random() < 0.6 else int(rng.integers(1, n + 3))
@@ -135,18 +143,19 @@ def _plant(rng: np.random.Generator, n: int, *, kind: StiffnessForm, signal: Fee
     F_q = J.T @ _task_stiffness(kind, Lambda, K_x) @ J
     if gravity is GravityCompensation.FEEDBACK:
         F_q = F_q - G
-    through_springs = F_q / K[:, None]
-    F = F_q
-    if signal is Feedback.STATIC_JOINT:
-        F = np.linalg.solve((np.eye(n) - through_springs).T, F_q.T).T
-        F = (F + F.T) / 2.0 if kind is not StiffnessForm.PUBLISHED else F
-    A_0, A_1 = _frozen_loop(M, G, K, B_s=B_s, D=D, F=F, link=signal is Feedback.JOINT)
+    F = signal.motor_stiffness(F_q, K)
+    if kind is not StiffnessForm.PUBLISHED:
+        F = (F + F.T) / 2.0
+    drives = actuators(
+        [f"joint{i}" for i in range(n)], spring_stiffness=K, rotor_inertia=B_s, motor_damping=D
+    )
+    loop = _frozen_loop(M, G, drives, F=F, links=not signal.has_potential)
     free = np.linalg.svd(J, full_matrices=True)[2][m:].T if weight == 0.0 else np.zeros((n, 0))
     return SeaPlant(
         M=M, G=G, K=K, B_s=B_s, D_theta=D, J=J, Lambda=Lambda, K_x=K_x,
-        form=kind, feedback=signal, gravity=gravity, F=F,
-        contraction=float(np.abs(np.linalg.eigvals(through_springs)).max()),
-        A_0=A_0, A_1=A_1,
+        form=kind, signal=signal, gravity=gravity, F=F,
+        contraction=float(np.abs(np.linalg.eigvals(F_q / K[:, None])).max()),
+        A_0=loop.A_0, A_1=loop.A_1,
         symmetries=np.vstack([free, free, np.zeros((2 * n, free.shape[1]))]),
     )  # fmt: skip
 
@@ -161,21 +170,7 @@ def _task_stiffness(kind: StiffnessForm, Lambda: Array, K_x: Array) -> Array:
     return root @ np.diag(K_x) @ root
 
 
-def _frozen_loop(
-    M: Array, G: Array, K: Array, *, B_s: Array, D: Array, F: Array, link: bool
-) -> tuple[Array, Array]:
-    n = len(K)
-    zero, one = np.zeros((n, n)), np.eye(n)
-    to_link, to_motor = np.linalg.solve(M, np.diag(K)), np.diag(K / B_s)
-    A_0 = np.block(
-        [
-            [zero, zero, one, zero],
-            [zero, zero, zero, one],
-            [-to_link - np.linalg.solve(M, G), to_link, zero, zero],
-            [to_motor, -to_motor, zero, -np.diag(D / B_s)],
-        ]
-    )
-    A_1 = np.zeros((4 * n, 4 * n))
-    column = 0 if link else n
-    A_1[3 * n :, column : column + n] = -F / B_s[:, None]
-    return A_0, A_1
+def _frozen_loop(M: Array, G: Array, drives: Actuators, *, F: Array, links: bool) -> FrozenLoop:
+    none = np.zeros_like(F)
+    C_z, C_theta = (-F, none) if links else (none, -F)
+    return sea_loop(drives, M=M, H=G, S=np.eye(len(F)), C_z=C_z, C_theta=C_theta)

@@ -1,11 +1,9 @@
 """Rightmost characteristic roots, by Chebyshev collocation and Newton's method."""
 
-import math
-
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.margin._loop import Loop, prepare
+from sealag.margin._loop import Loop, prepare, time_of
 from sealag.typing import Array, ArrayLike
 
 _MOST_NODES = 120
@@ -16,20 +14,25 @@ def rightmost_roots(
     A_1: ArrayLike,
     delay: float,
     *,
+    A_e: ArrayLike | None = None,
+    embedded_delay: float = 0.0,
     count: int = 1,
     nodes: int = 24,
     symmetries: ArrayLike | None = None,
 ) -> Array:
-    """Rightmost roots of det(λ − A_0 − A_1 e^{-λd}) = 0.
+    """Rightmost roots of det(λ − A_0 − A_1 e^{-λd} − A_e e^{-λe}) = 0.
 
-    The generator of the solution semigroup is discretised on Chebyshev nodes over [−d, 0]
-    (Breda, Maset & Vermiglio) and every root refined by Newton's method on the characteristic
-    equation. Independent of `delay_margin`; a heuristic where `nodes` resolve too little.
+    The generator of the solution semigroup is discretised on Chebyshev nodes over the longer delay,
+    in two pieces where there are two delays (Breda, Maset & Vermiglio), and every root refined by
+    Newton's method on the characteristic equation. Independent of `delay_margin`; a heuristic where
+    `nodes` resolve too little.
 
     Args:
         A_0: (n, n) undelayed part, 1/s.
         A_1: (n, n) delayed part, 1/s.
         delay: d, s, constant.
+        A_e: (n, n) part with the fixed delay, 1/s; None for none.
+        embedded_delay: that delay e, s.
         count: how many roots.
         nodes: Chebyshev nodes over the delay; doubled until the roots stand still.
         symmetries: (n, s) neutral directions to leave out, as in `delay_margin`.
@@ -40,11 +43,11 @@ def rightmost_roots(
     Raises:
         InputError: a matrix cannot be used, or the delay is negative or not finite.
     """
-    if not (math.isfinite(delay) and delay >= 0.0):
-        raise InputError(f"delay is {delay} s; a finite time of at least zero is needed.")
+    delay = time_of("delay", delay)
     if count < 1 or nodes < 4:
         raise InputError(f"count is {count} and nodes {nodes}; at least 1 and 4 are needed.")
-    return loop_roots(prepare(A_0, A_1, symmetries=symmetries), delay, count=count, nodes=nodes)
+    loop = prepare(A_0, A_1, symmetries=symmetries, A_e=A_e, embedded_delay=embedded_delay)
+    return loop_roots(loop, delay, count=count, nodes=nodes)
 
 
 def loop_roots(loop: Loop, delay: float, *, count: int, nodes: int = 24) -> Array:
@@ -59,27 +62,41 @@ def loop_roots(loop: Loop, delay: float, *, count: int, nodes: int = 24) -> Arra
     Returns:
         (count,) roots by decreasing real part.
     """
-    if delay == 0.0 or not loop.B.size:
-        values = np.linalg.eigvals(loop.A_0 + loop.A_1)
+    if not _pieces(loop, delay):
+        values = np.linalg.eigvals(loop.A_0 + loop.A_1 + loop.A_e)
         return values[np.argsort(-values.real)][:count]
+    longest = max(_pieces(loop, delay))
     previous = _collocated(loop, delay, count=count, nodes=nodes)
     while nodes < _MOST_NODES:
         nodes = 3 * nodes // 2
         roots = _collocated(loop, delay, count=count, nodes=nodes)
         moved = np.abs(roots.real - previous.real).max()
-        if moved <= 1e-8 * max(1.0 / delay, float(np.abs(roots).max())):
+        if moved <= 1e-8 * max(1.0 / longest, float(np.abs(roots).max())):
             break
         previous = roots
     return roots
 
 
+def _pieces(loop: Loop, delay: float) -> list[float]:
+    """The delays in increasing order, each once, zero left out."""
+    late = [delay] if loop.B.size else []
+    return sorted({age for age in (*late, loop.embedded_delay) if age > 0.0})
+
+
 def _collocated(loop: Loop, delay: float, *, count: int, nodes: int) -> Array:
     n = len(loop.A_0)
-    D = 2.0 / delay * _differentiation(nodes)
+    ages = _pieces(loop, delay)
+    starts = [0.0, *ages[:-1]]
+    D = np.zeros((len(ages) * nodes + 1,) * 2)
+    for piece, (start, end) in enumerate(zip(starts, ages, strict=True)):
+        at = slice(piece * nodes, (piece + 1) * nodes + 1)
+        D[at, at][1:] = 2.0 / (end - start) * _differentiation(nodes)[1:]
     generator = np.kron(D, np.eye(n))
     generator[:n] = 0.0
-    generator[:n, :n] = loop.A_0
-    generator[:n, -n:] += loop.A_1
+    row = {0.0: 0, **{age: (piece + 1) * nodes for piece, age in enumerate(ages)}}
+    for part, age in ((loop.A_0, 0.0), (loop.A_1, delay), (loop.A_e, loop.embedded_delay)):
+        at = row.get(age, 0)
+        generator[:n, at * n : (at + 1) * n] += part
     values = np.linalg.eigvals(generator)
     values = values[np.argsort(-values.real)][: 2 * count + 4]
     refined = np.array([_newton(loop, delay, value) for value in values])
@@ -98,18 +115,18 @@ def _differentiation(N: int) -> Array:
 
 def _newton(loop: Loop, delay: float, root: complex) -> complex:
     """Newton on the smallest singular direction; the start where it wanders off."""
-    start = root
+    start, longest = root, max(_pieces(loop, delay))
     for _ in range(12):
-        late = np.exp(-root * delay) * loop.A_1
-        P = root * np.eye(len(loop.A_0)) - loop.A_0 - late
+        factor = np.exp(-root * delay)
+        P, rate = loop.characteristic(root, factor)
         U, values, V = np.linalg.svd(P)
         left, right = U[:, -1].conj(), V[-1].conj()
-        slope = left @ right + delay * (left @ late @ right)
+        slope = left @ (rate + delay * factor * loop.A_1) @ right
         if slope == 0.0:
             break
         step = values[-1] / slope
         root = root - step
-        if abs(root - start) > 0.1 * max(abs(start), 1.0 / delay):
+        if abs(root - start) > 0.1 * max(abs(start), 1.0 / longest):
             return start
         if abs(step) <= 1e-14 * max(abs(root), 1e-300):
             break

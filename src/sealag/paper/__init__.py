@@ -23,7 +23,7 @@ from sealag.paper._random_table import (
     compare_plant,
     random_plant_table,
 )
-from sealag.paper._unsafe import UnsafeExample, sea_loop, unsafe_examples
+from sealag.paper._unsafe import UnsafeExample, delayed_margin, unsafe_examples
 from sealag.paper._walk import Walk, WalkCase, measure_walk, simulate_walk
 from sealag.paper._walk_errors import SensorNoise
 from sealag.paper._walk_table import (
@@ -57,6 +57,7 @@ __all__ = [
     "beyond_cases",
     "compare_plant",
     "delay_map",
+    "delayed_margin",
     "figure_4",
     "figure_4_claims",
     "figure_5",
@@ -68,7 +69,6 @@ __all__ = [
     "random_plant_table",
     "robustness_cases",
     "rough_terrains",
-    "sea_loop",
     "simulate_walk",
     "simulated_motion",
     "unsafe_examples",

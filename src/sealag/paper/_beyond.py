@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sealag.design import System, certified_bounds, load, local_margins
+from sealag.design import System, certified_bounds, load, margin_of
 from sealag.locomotion import FlatTerrain, rough_terrain, stairs
 from sealag.paper._walk import WalkCase, at_delay_scale
 from sealag.paper._walk_table import WalkRow, walk_success
 from sealag.robot import Motion
 from sealag.simulation import Push
 from sealag.typing import Array
-from sealag.whole_body import Feedback
+from sealag.whole_body import MotorAngles, StaticJoint
 
 PUSH = 0.1  # s
 PUSHED = 1.3  # s, in the fourth step
@@ -141,20 +141,18 @@ def delay_map(
     )
 
 
+LOOPS = 16
+"""Instants of a walk whose frozen loops are computed for each stiffness."""
+
+
 def _bounds(system: System, motion: Motion, stiffness: float) -> tuple[float, float, float]:
     springs = np.full(system.actuators.n, stiffness)
     design = replace(system, actuators=replace(system.actuators, spring_stiffness=springs))
     certified = []
-    for feedback in (Feedback.MOTOR, Feedback.STATIC_JOINT):
-        variant = replace(design, feedback=feedback)
-        stack = variant.evaluate(motion)
-        certified.append(float(certified_bounds(stack, variant).delay.min()))
-    thin = max(1, len(motion) // 100)
-    part = Motion(
-        time=motion.time[::thin],
-        q=motion.q[::thin],
-        v=motion.v[::thin],
-        contact_sets=motion.contact_sets,
-        contact_index=motion.contact_index[::thin],
-    )
-    return (*certified, local_margins(design, part).first_crossing_s)
+    for signal in (MotorAngles(), StaticJoint()):
+        variant = replace(design, law=replace(design.law, signal=signal))
+        spaces = variant.spaces(motion)
+        certified.append(float(certified_bounds(spaces, variant).delay.min()))
+    sample = np.linspace(0, len(motion) - 1, LOOPS).astype(int)
+    crossings = [margin_of(design.frozen(motion, int(k))).first_crossing for k in sample]
+    return (*certified, float(min(crossings)))

@@ -12,20 +12,23 @@ from sealag.robot import Contact, Motion, Robot
 from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.whole_body import (
-    Feedback,
     GravityCompensation,
+    MotorAngles,
+    Signal,
+    Spaces,
+    StaticJoint,
     StiffnessForm,
-    WholeBodyStack,
+    Tank,
 )
 
 LEG = ("abduction", "hip", "knee")
 
 VARIANTS = (
-    (StiffnessForm.PUBLISHED, Feedback.STATIC_JOINT, GravityCompensation.FEEDBACK),
-    (StiffnessForm.SYMMETRIC, Feedback.STATIC_JOINT, GravityCompensation.PLANNED),
-    (StiffnessForm.SYMMETRIC, Feedback.STATIC_JOINT_TANK, GravityCompensation.PLANNED),
-    (StiffnessForm.SYMMETRIC, Feedback.MOTOR, GravityCompensation.PLANNED),
-    (StiffnessForm.SYMMETRIC, Feedback.MOTOR, GravityCompensation.FEEDBACK),
+    (StiffnessForm.PUBLISHED, StaticJoint(), GravityCompensation.FEEDBACK),
+    (StiffnessForm.SYMMETRIC, StaticJoint(), GravityCompensation.PLANNED),
+    (StiffnessForm.SYMMETRIC, Tank(), GravityCompensation.PLANNED),
+    (StiffnessForm.SYMMETRIC, MotorAngles(), GravityCompensation.PLANNED),
+    (StiffnessForm.SYMMETRIC, MotorAngles(), GravityCompensation.FEEDBACK),
 )
 """Ways to run the paper's gains; the first is the law as printed, Eqs. (11), (16), (17)."""
 
@@ -47,7 +50,7 @@ class CertifiedVariant:
     """What the certified criterion says of one way to run the same gains.
 
     Attributes:
-        feedback: the signal that is fed back.
+        signal: the word of the signal that is fed back.
         form: how the stiffness is built from K_x and Λ.
         gravity: how gravity is compensated.
         delay_s: (N,) bound at every instant for the paper's D_θ; 0 where a condition fails.
@@ -56,7 +59,7 @@ class CertifiedVariant:
         reason: why it is not certified, or an empty text.
     """
 
-    feedback: Feedback
+    signal: str
     form: StiffnessForm
     gravity: GravityCompensation
     delay_s: Array
@@ -108,12 +111,15 @@ def figure_4(robot: Robot, motion: Motion, *, system: System) -> Figure4:
     """
     printed = replace(
         system,
-        hierarchy=replace(system.hierarchy, form=StiffnessForm.PUBLISHED),
-        feedback=Feedback.MOTOR,
-        gravity=GravityCompensation.NONE,
+        law=replace(
+            system.law,
+            stiffness_form=StiffnessForm.PUBLISHED,
+            signal=MotorAngles(),
+            gravity=GravityCompensation.NONE,
+        ),
     )
-    stack = printed.evaluate(motion)
-    leg = _one_leg(robot, motion, stack)
+    spaces = printed.spaces(motion)
+    leg = _one_leg(robot, motion, spaces)
     D = system.actuators.motor_damping
     hip = [robot.joints.index(f"right_{name}") for name in LEG]
     one_leg = D[hip]
@@ -125,14 +131,14 @@ def figure_4(robot: Robot, motion: Motion, *, system: System) -> Figure4:
             [damping if "abduction" in j else D[k] for k, j in enumerate(robot.joints)]
         )
         for k, factor in enumerate(alpha):
-            bound = max_delay(leg, stack.Lambda, stack.K_x, factor * leg_D, form="published")
+            bound = max_delay(leg, spaces.Lambda, spaces.K_x, factor * leg_D, form="published")
             whole = max_delay(
-                stack.J_star, stack.Lambda, stack.K_x, factor * body_D, form="published"
+                spaces.J_star, spaces.Lambda, spaces.K_x, factor * body_D, form="published"
             )
             worst[i, k], both[i, k] = bound.delay.min(), whole.delay.min()
-        instants.append(max_delay(leg, stack.Lambda, stack.K_x, leg_D, form="published").delay)
+        instants.append(max_delay(leg, spaces.Lambda, spaces.K_x, leg_D, form="published").delay)
     scaled = [
-        float(max_delay(leg, stack.Lambda, s * stack.K_x, one_leg, form="published").delay.min())
+        float(max_delay(leg, spaces.Lambda, s * spaces.K_x, one_leg, form="published").delay.min())
         for s in STIFFNESS_SCALE
     ]
     return Figure4(
@@ -149,14 +155,14 @@ def figure_4(robot: Robot, motion: Motion, *, system: System) -> Figure4:
     )
 
 
-def _one_leg(robot: Robot, motion: Motion, stack: WholeBodyStack) -> Array:
+def _one_leg(robot: Robot, motion: Motion, spaces: Spaces) -> Array:
     """The stance leg's three columns of J* at each instant: (N, m, 3)."""
-    leg = np.zeros((len(stack), stack.J_star.shape[1], len(LEG)))
+    leg = np.zeros((len(spaces), spaces.J_star.shape[1], len(LEG)))
     for index, contacts in enumerate(motion.contact_sets):
         side = contacts[0].frame.removesuffix("_foot")
         columns = [robot.joints.index(f"{side}_{name}") for name in LEG]
         where = motion.contact_index == index
-        leg[where] = stack.J_star[where][:, :, columns]
+        leg[where] = spaces.J_star[where][:, :, columns]
     return leg
 
 
@@ -164,21 +170,21 @@ def _certified(
     system: System,
     motion: Motion,
     form: StiffnessForm,
-    feedback: Feedback,
+    signal: Signal,
     gravity: GravityCompensation,
 ) -> CertifiedVariant:
     """The certified criterion for one way to run the gains, all six joints."""
-    hierarchy = replace(system.hierarchy, form=form)
-    design = replace(system, hierarchy=hierarchy, feedback=feedback, gravity=gravity)
-    stack = design.evaluate(motion)
-    bounds = certified_bounds(stack, design)
+    law = replace(system.law, stiffness_form=form, signal=signal, gravity=gravity)
+    design = replace(system, law=law)
+    spaces = design.spaces(motion)
+    bounds = certified_bounds(spaces, design)
     return CertifiedVariant(
-        feedback=feedback,
+        signal=signal.name,
         form=form,
         gravity=gravity,
         delay_s=bounds.delay,
-        contraction=float(stack.contraction.max()),
-        asymmetry=float(np.nanmax(stack.asymmetry)),
+        contraction=float(spaces.contraction.max()),
+        asymmetry=float(np.nanmax(spaces.asymmetry)),
         reason="; ".join(bounds.reasons),
     )
 
@@ -199,7 +205,7 @@ def figure_4_claims(figure: Figure4, table: RandomPlantTable) -> tuple[Claim, ..
     falling = np.diff(figure.stiffness_delay_s) < 0.0
     bounds = ", ".join(f"{d * 1e3:.1f}" for d in figure.stiffness_delay_s)
     refused = [
-        f"{v.form}, {v.feedback}, gravity {v.gravity}".replace("_", " ")
+        f"{v.form}, {v.signal}, gravity {v.gravity}".replace("_", " ")
         for v in figure.certified
         if v.reason
     ]

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.margin import delay_margin
+from sealag.actuation import actuators
+from sealag.margin import DelayMargin, delay_margin
 from sealag.passivity import max_delay, max_delay_from_stiffness
 from sealag.typing import Array
+from sealag.whole_body import sea_loop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,13 +40,12 @@ class UnsafeExample:
         return self.certified_delay_s is not None and self.certified_delay_s > self.margin_s
 
 
-def sea_loop(
+def delayed_margin(
     M: Array, K: Array, B_s: Array, *, D: Array, F: Array, link_feedback: bool = False
-) -> tuple[Array, Array]:
-    """Build the frozen loop of SEA joints without gravity under delayed stiffness feedback.
+) -> DelayMargin:
+    """Return the exact margin of SEA joints without gravity under delayed stiffness feedback.
 
-    M q̈ = K(θ − q) and B_s θ̈ + D θ̇ + K(θ − q) = −F y(t − d), with y = θ or y = q; the state is
-    [q, θ, q̇, θ̇].
+    M q̈ = K(θ − q) and B_s θ̈ + D θ̇ + K(θ − q) = −F y(t − d), with y = θ or y = q.
 
     Args:
         M: (n, n) link inertia.
@@ -53,25 +54,13 @@ def sea_loop(
         D: (n,) motor damping.
         F: (n, n) delayed stiffness, Nm/rad.
         link_feedback: whether the link angle is fed back instead of the motor angle.
-
-    Returns:
-        A_0 and A_1 of ẋ = A_0 x + A_1 x(t − d), both (4n, 4n).
     """
-    n = len(K)
-    zero, one = np.zeros((n, n)), np.eye(n)
-    MK, BK = np.linalg.solve(M, np.diag(K)), np.diag(K / B_s)
-    A_0 = np.block(
-        [
-            [zero, zero, one, zero],
-            [zero, zero, zero, one],
-            [-MK, MK, zero, zero],
-            [BK, -BK, zero, -np.diag(D / B_s)],
-        ]
-    )
-    A_1 = np.zeros((4 * n, 4 * n))
-    column = 0 if link_feedback else n
-    A_1[3 * n :, column : column + n] = -F / B_s[:, None]
-    return A_0, A_1
+    names = [f"joint{i}" for i in range(len(K))]
+    drives = actuators(names, spring_stiffness=K, rotor_inertia=B_s, motor_damping=D)
+    none = np.zeros_like(F)
+    C_z, C_theta = (-F, none) if link_feedback else (none, -F)
+    loop = sea_loop(drives, M=M, H=none, S=np.eye(len(K)), C_z=C_z, C_theta=C_theta)
+    return delay_margin(loop.A_0, loop.A_1)
 
 
 def _one_joint(M: float, K_q: float, *, link_feedback: bool = False) -> UnsafeExample:
@@ -79,7 +68,7 @@ def _one_joint(M: float, K_q: float, *, link_feedback: bool = False) -> UnsafeEx
     published = max_delay(np.eye(1), np.eye(1), np.array([K_q]), D)
     K_theta = np.array([[1.0 / (1.0 / K_q - 1.0 / K[0])]])
     F = np.array([[K_q]]) if link_feedback else K_theta
-    margin = delay_margin(*sea_loop(np.array([[M]]), K, B_s, D=D, F=F, link_feedback=link_feedback))
+    margin = delayed_margin(np.array([[M]]), K, B_s, D=D, F=F, link_feedback=link_feedback)
     signal = "link angle" if link_feedback else "q̄(θ)"
     certified = None if link_feedback else float(max_delay_from_stiffness(K_theta, D).delay)
     return UnsafeExample(
@@ -104,7 +93,7 @@ def _asymmetric_plants(count: int, seed: int) -> list[UnsafeExample]:
         D, K, B_s = np.full(3, 100.0), np.full(3, 1e4), np.full(3, 0.1)
         published = max_delay(J, Lambda, K_x, D, form="published")
         F = J.T @ Lambda @ np.diag(K_x) @ J
-        margin = delay_margin(*sea_loop(M, K, B_s, D=D, F=F))
+        margin = delayed_margin(M, K, B_s, D=D, F=F)
         if margin.delay < published.delay:
             asymmetry = np.linalg.norm(F - F.T) / np.linalg.norm(F + F.T)
             found.append(

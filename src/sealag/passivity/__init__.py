@@ -7,15 +7,18 @@ from sealag.passivity._bounds import (
     max_delay_from_stiffness,
 )
 from sealag.passivity._certificate import (
+    Assumption,
+    Basis,
     Certificate,
     Criterion,
+    Critical,
     LocalLoop,
     Proof,
+    Rest,
     Status,
     Window,
     Worst,
     content_digest,
-    read_certificate,
     write_certificate,
 )
 from sealag.passivity._checks import Check, Verification
@@ -39,6 +42,7 @@ from sealag.passivity._problem import (
     proven_delays,
     refuted_delay,
 )
+from sealag.passivity._reading import read_certificate
 from sealag.passivity._solvers import ClarabelCvxpy, ClarabelDirect, ClosedForm, Solver
 from sealag.passivity._storage import (
     DelayStorage,
@@ -51,6 +55,8 @@ from sealag.passivity._task_multipliers import task_multipliers
 from sealag.passivity._verify import verify
 
 __all__ = [
+    "Assumption",
+    "Basis",
     "Certificate",
     "Check",
     "ClarabelCvxpy",
@@ -58,6 +64,7 @@ __all__ = [
     "ClosedForm",
     "CommonBound",
     "Criterion",
+    "Critical",
     "DelayBound",
     "DelayStorage",
     "Factor",
@@ -66,6 +73,7 @@ __all__ = [
     "MultitaskBound",
     "PolytopeBound",
     "Proof",
+    "Rest",
     "Solution",
     "Solver",
     "Status",

@@ -2,22 +2,26 @@
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
-from sealag.errors import CertificateError
-from sealag.files import read_whole, write_text
+from sealag.errors import FileError
+from sealag.files import write_text
+from sealag.passivity._layout import LARGEST_BYTES, UNBOUNDED, encoded
 
-SCHEMA = "sealag-certificate/3"
-LARGEST_BYTES = 500_000_000
+SCHEMA = "sealag-certificate/4"
+
+Time = Annotated[float, UNBOUNDED]
+"""A time in s that may be inf: "unbounded" in a file, for what no delay reaches."""
 
 _LONG = {
     "time_s",
     "bounds_s",
+    "instant_margins_s",
+    "instant_basis",
     "proofs",
     "worst_motion",
     "local_loop",
@@ -43,6 +47,59 @@ class Criterion(StrEnum):
 
     PUBLISHED = "published"
     CERTIFIED = "certified"
+
+
+class Basis(StrEnum):
+    """What an instant's local margin rests on.
+
+    exact: the margin itself. bound: the passive bound of that instant, which is not above its
+    margin, where the loop without delay was decided to be stable. searched: stable likewise, and
+    no root crosses at a delay up to this one. open: not decided.
+    """
+
+    EXACT = "exact"
+    BOUND = "bound"
+    SEARCHED = "searched"
+    OPEN = "open"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assumption:
+    """Something that is taken for granted.
+
+    Attributes:
+        key: a short name that stays the same from one certificate to the next.
+        text: the assumption, in a sentence.
+    """
+
+    key: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rest:
+    """Where the loop of a single posture rests.
+
+    Attributes:
+        found: whether an equilibrium was found near the posture.
+        moved_rad: largest joint distance between the posture and where the loop rests, rad.
+    """
+
+    found: bool
+    moved_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Critical:
+    """The instant that sets the local margin: the smallest, among zeros the most unstable.
+
+    Attributes:
+        instant: its index.
+        time_s: its time, s.
+    """
+
+    instant: int
+    time_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,32 +174,36 @@ class Window:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LocalLoop:
-    """The frozen loop at the worst instant, ẍ + R ẋ + P x + L x(t − d) = 0, x = [z, θ].
-
-    z are k coordinates of the motions that the contacts leave free, θ the n motor angles.
+    """The frozen loop at the critical instant, ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e).
 
     Attributes:
-        P: (k + n, k + n) restoring forces over inertia, 1/s².
-        R: (k + n, k + n) damping over inertia, 1/s.
-        L: (k + n, k + n) delayed stiffness over inertia, 1/s².
-        symmetries: (k + n, s) x along which nothing acts: P x = R x = L x = 0.
-        motor_inertia: (n,) B_s, kg m²: P, R and L hold K, D_θ + D_s and F over it.
-        spring_damping: (n,) D_s, Nms/rad.
-        frequency_rad_s: of the roots that cross at `first_crossing_s`; None where none is known.
+        A_0: (s, s) what acts at once, 1/s.
+        A_1: (s, s) what the delay d makes late, 1/s.
+        A_e: (s, s) what the embedded delay e makes late, 1/s; None if nothing is.
+        embedded_delay_s: e, s.
+        symmetries: (s, k) x along which nothing acts: A_0 x = A_1 x = A_e x = 0.
+        states: (s,) names: z0 … coordinates of the motions that the contacts leave free,
+            theta:JOINT motor angles, `d/dt` of each, drive:JOINT the torque of a motor with a
+            bandwidth, tank:ROW the states of the energy tank.
+        frequency_rad_s: of the roots that cross at `first_crossing_s`; None where none does, or
+            none is known.
     """
 
-    P: list[list[float]]
-    R: list[list[float]]
-    L: list[list[float]]
+    A_0: list[list[float]]
+    A_1: list[list[float]]
+    A_e: list[list[float]] | None
+    embedded_delay_s: float
     symmetries: list[list[float]]
-    motor_inertia: list[float]
-    spring_damping: list[float]
+    states: list[str]
     frequency_rad_s: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """Answer of `sealag certify`. It has no truth value: read `status`.
+
+    A time is inf, and "unbounded" in the file, where no delay is too long; None, and null in the
+    file, means not known, or not asked for where it says so.
 
     Attributes:
         status: certified or not.
@@ -152,26 +213,30 @@ class Certificate:
         delay_s: upper bound of the design's own delay d_1, s.
         asymmetry: largest ‖F − Fᵀ‖ / ‖F + Fᵀ‖ over the motion, F the criterion's stiffness.
         contraction: largest contraction factor of q̄(θ) over the motion.
-        worst: the instant that sets the answer.
+        worst: the instant that sets the bound.
+        critical: the instant that sets the local margin.
         worst_motion: (2, n) real and imaginary part of the motor velocities y in the motion that
-            turns active first there: d |y* F y| = y* D_θ y at the supremum d.
+            turns active first at the worst instant: d |y* F y| = y* D_θ y = 1 at the supremum d.
         instants: number of instants.
         feedback: the signal that is fed back.
         gravity: how gravity is compensated.
         stiffness_form: how stiffness follows from K_x and Λ.
         task_inertia: which Λ that is.
         levels: (k + 1,) first task row of each priority level, then m.
-        stable: whether the potential has a strict minimum at the worst instant, up to symmetries;
-            None where that has no meaning.
-        local_margin_s: exact local delay margin at the worst instant, s; None for infinity, or
-            where it could not be decided.
-        first_crossing_s: delay at which one more pair of roots crosses there; None if none does,
-            or where it could not be decided.
-        unstable_modes: roots with positive real part without delay, there.
-        local_loop: the frozen loop there; None where the fed-back signal has none.
-        conservatism: local margin over max_delay_s; None where either is 0 or infinite.
+        stable: whether the loop is stable without delay at all instants; None where that is not
+            decided at one of them, and unstable at none.
+        local_margin_s: smallest exact local delay margin over all instants, s; 0 where a mode is
+            unstable without delay.
+        first_crossing_s: delay at which one more pair of roots crosses at the critical instant, s;
+            the local margin where no root is unstable without delay.
+        unstable_modes: roots with positive real part without delay, the most over all instants.
+        instant_margins_s: (N,) local margin at each instant, or what is known not to exceed it.
+        instant_basis: (N,) what each of these rests on.
+        local_loop: the frozen loop at the critical instant.
+        equilibrium: where the loop rests; None for a motion.
+        conservatism: local margin over max_delay_s; None where either is 0 or unbounded too.
         common_multiplier_delay_s: bound with one multiplier for the whole motion, which V_4 needs;
-            None if it was not computed.
+            None if it was not asked for.
         common_multiplier: (n, n) that multiplier W, in joint coordinates.
         time_varying_delay_s: bound for matrices that vary as they like inside polytopes around
             the motion, window by window, s; None if it was not asked for.
@@ -186,6 +251,11 @@ class Certificate:
         joints: names, in the order of all arrays.
         D_theta: (n,) motor damping, Nms/rad.
         spring_stiffness: (n,) K, Nm/rad.
+        spring_damping: (n,) D_s beside the springs, Nms/rad.
+        viscous_friction: (n,) at the motors, Nms/rad.
+        motor_inertia: (n,) B_s, kg m².
+        rotor_inertia: (n,) B, kg m².
+        torque_bandwidth: (n,) of the drives, rad/s; None for an ideal one.
         time_s: (N,) instants.
         bounds_s: (N,) bound at each.
         proofs: numbers to check, for the instants with the smallest bounds and those that bind the
@@ -197,12 +267,13 @@ class Certificate:
 
     status: Status
     criterion: Criterion
-    max_delay_s: float
-    max_delay_upper_s: float
+    max_delay_s: Time
+    max_delay_upper_s: Time
     delay_s: float
-    asymmetry: float
-    contraction: float
+    asymmetry: float | None
+    contraction: float | None
     worst: Worst
+    critical: Critical
     worst_motion: list[list[float]]
     instants: int
     feedback: str
@@ -211,25 +282,33 @@ class Certificate:
     task_inertia: str
     levels: list[int]
     stable: bool | None
-    local_margin_s: float | None
-    first_crossing_s: float | None
+    local_margin_s: Time | None
+    first_crossing_s: Time | None
     unstable_modes: int
+    instant_margins_s: list[Time | None]
+    instant_basis: list[Basis]
     local_loop: LocalLoop | None
+    equilibrium: Rest | None
     conservatism: float | None
-    common_multiplier_delay_s: float | None
+    common_multiplier_delay_s: Time | None
     common_multiplier: list[list[float]] | None
-    time_varying_delay_s: float | None
+    time_varying_delay_s: Time | None
     time_varying_multiplier: list[list[float]] | None
     time_varying_windows: tuple[Window, ...]
     left_open: Mapping[str, str]
-    published_max_delay_s: float
+    published_max_delay_s: Time
     reasons: tuple[str, ...]
-    assumptions: tuple[str, ...]
+    assumptions: tuple[Assumption, ...]
     joints: tuple[str, ...]
     D_theta: list[float]
     spring_stiffness: list[float]
+    spring_damping: list[float]
+    viscous_friction: list[float]
+    motor_inertia: list[float]
+    rotor_inertia: list[float]
+    torque_bandwidth: list[float | None]
     time_s: list[float]
-    bounds_s: list[float]
+    bounds_s: list[Time]
     proofs: tuple[Proof, ...]
     hashes: Mapping[str, str]
     versions: Mapping[str, str]
@@ -240,27 +319,13 @@ class Certificate:
         raise TypeError("A certificate has no truth value; read its `status`.")
 
     def summary(self) -> dict[str, Any]:
-        """Return the answer without the long arrays, as `sealag certify --json` prints it.
-
-        Numbers that are not finite become null: a delay-independent bound has no number.
-        """
-        return _strict({k: v for k, v in asdict(self).items() if k not in _LONG})
+        """Return the answer without the long arrays, as `sealag certify --json` prints it."""
+        return {key: value for key, value in encoded(self, Certificate).items() if key not in _LONG}
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Return everything with the digest of it, and null for numbers that are not finite."""
-        data = _strict(asdict(self))
+        """Return everything, as the file says it, with the digest of it."""
+        data = encoded(self, Certificate)
         return {**data, "hashes": {**data["hashes"], "content": content_digest(data)}}
-
-
-def _strict(value: Any) -> Any:
-    """Replace what JSON cannot say."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Mapping):
-        return {key: _strict(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_strict(entry) for entry in value]
-    return value
 
 
 def content_digest(data: Mapping[str, Any]) -> str:
@@ -284,57 +349,13 @@ def write_certificate(certificate: Certificate, path: Path) -> None:
         path: where; the folder is made if needed.
 
     Raises:
-        FileError: it cannot be written.
+        FileError: it cannot be written, or is larger than what is read.
     """
     entries = certificate.to_json_dict().items()
     lines = (f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in entries)
-    write_text(path, "{\n" + ",\n".join(lines) + "\n}\n")
-
-
-def read_certificate(path: Path) -> dict[str, Any]:
-    """Read a certificate file as plain data, checking its layout but none of its claims.
-
-    Args:
-        path: the file.
-
-    Raises:
-        FileError: it cannot be read.
-        CertificateError: it is not a certificate of a known layout.
-    """
-    return parse_certificate(path)[0]
-
-
-def parse_certificate(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Read a certificate file, and tell which of its numbers are not written as `repr` writes them.
-
-    Such a number has a changed digit that its double does not show.
-
-    Args:
-        path: the file.
-
-    Returns:
-        The plain data, and those numbers.
-
-    Raises:
-        FileError: it cannot be read.
-        CertificateError: it is not a certificate of a known layout.
-    """
-    odd: list[str] = []
-
-    def number(text: str) -> float:
-        value = float(text)
-        if repr(value) != text:
-            odd.append(text)
-        return value
-
-    content = read_whole(path, what="The certificate", largest=LARGEST_BYTES)
-    try:
-        data = json.loads(content.decode("utf-8"), parse_float=number)
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise CertificateError(f"{path} is not a certificate: it is not JSON ({error}).") from error
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise CertificateError(f"{path} is not a certificate of the layout {SCHEMA}.")
-    missing = [entry.name for entry in fields(Certificate) if entry.name not in data]
-    if missing:
-        raise CertificateError(f"{path} lacks {', '.join(missing)}, so it is not a certificate.")
-    return data, tuple(odd)
+    text = "{\n" + ",\n".join(lines) + "\n}\n"
+    if len(text) > LARGEST_BYTES:
+        raise FileError(
+            f"{path} would be larger than {LARGEST_BYTES / 1e6:g} MB; ask for fewer proofs."
+        )
+    write_text(path, text)

@@ -1,15 +1,16 @@
 """Claims of a certificate that follow from, or contradict, its other numbers."""
 
 import math
+import re
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
-from sealag.passivity._certificate import content_digest
+from sealag.passivity._certificate import Basis, Certificate, Criterion, Proof, Status
 from sealag.passivity._checks import Check
-from sealag.passivity._definite import Reader
 from sealag.passivity._inequalities import AGREEMENT, SYMMETRY, asymmetry
+from sealag.passivity._local import coupled
+from sealag.passivity._reading import Given
 from sealag.typing import Array
 
 _WORDS = {
@@ -17,147 +18,207 @@ _WORDS = {
     "gravity": ("feedback", "planned", "none"),
     "stiffness_form": ("symmetric", "published", "force"),
     "task_inertia": ("lambda_ts", "lambda_star"),
-    "criterion": ("certified", "published"),
 }
+_BOUNDS = ("max_delay_s", "common_multiplier_delay_s", "time_varying_delay_s")
+_HASHES = ("urdf", "project", "content")
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+_KEY = re.compile(r"[a-z][a-z0-9_]{0,59}")
+_VERSION = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+_-]{0,59}")
 
 
-def content_check(data: dict[str, Any], odd: tuple[str, ...]) -> Check:
+def content_check(given: Given) -> Check:
     """Check that no digit differs from what was written: digest and form of every number.
 
     Args:
-        data: the certificate as plain data.
-        odd: numbers of the file whose digits are not those of their double.
+        given: the certificate as it was given.
     """
-    same = content_digest(data) == data["hashes"].get("content")
-    if odd:
-        detail = f"the number {odd[0]} is {float(odd[0])!r}"
+    if given.odd:
+        detail = f"the number {given.odd[0]} is {float(given.odd[0])!r}"
     else:
-        detail = "the digest agrees" if same else "the digest is of other content"
-    return Check(name="content is as written", ok=same and not odd, detail=detail)
+        detail = "the digest agrees" if given.sealed else "the digest is of other content"
+    return Check(name="content is as written", ok=given.sealed and not given.odd, detail=detail)
 
 
-def largest_delay(data: dict[str, Any]) -> float:
-    """Return the claimed bound; null is a bound without end.
-
-    Args:
-        data: the certificate as plain data.
-    """
-    return math.inf if data["max_delay_s"] is None else float(data["max_delay_s"])
-
-
-def claim_checks(data: dict[str, Any], number: Reader) -> Iterator[Check]:
+def claim_checks(c: Certificate) -> Iterator[Check]:
     """Check instants, smallest bound, verdict, and what else the file says of the motion.
 
     Args:
-        data: the certificate as plain data.
-        number: how its numbers are read: doubles or rationals.
-
-    Raises:
-        ValueError: numbers do not fit each other.
+        c: the certificate.
     """
-    bounds = [math.inf if b is None else float(b) for b in data["bounds_s"]]
-    proven = [proof["instant"] for proof in data["proofs"]]
-    if not all(0 <= at < len(bounds) for at in proven):
-        raise ValueError("a proof belongs to no instant")
-    yield from _instants(data, bounds, proven)
-    yield _levels(data)
-    yield _verdict(data)
-    yield _published(data)
-    yield _conservatism(data)
-    yield _unbounded(data)
-    worst = [proof for proof in data["proofs"] if proof["instant"] == data["worst"]["instant"]]
-    yield Check(
-        name="proof of the worst instant",
-        ok=bool(worst) or not 0.0 < largest_delay(data) < math.inf,
-        detail=f"{len(proven)} instants have proofs",
+    yield from _labels(c)
+    yield from _instants(c)
+    yield from _margins(c)
+    yield _verdict(c)
+    yield _published(c)
+    yield _conservatism(c)
+    yield _unbounded(c)
+    yield _contraction(c)
+    yield _asymmetry(c)
+
+
+def worst_proof(c: Certificate) -> Proof | None:
+    """Return the proof of the instant that sets the bound, if there is one.
+
+    Args:
+        c: the certificate.
+    """
+    return next((proof for proof in c.proofs if proof.instant == c.worst.instant), None)
+
+
+def _labels(c: Certificate) -> Iterator[Check]:
+    """Words, digests, versions and keys are of the kinds that a certificate has."""
+    bad = [key for key, words in _WORDS.items() if getattr(c, key) not in words]
+    yield Check(name="words of the law", ok=not bad, detail=f"unknown: {bad}" if bad else "known")
+    known = all(key in _HASHES and _DIGEST.fullmatch(value) for key, value in c.hashes.items())
+    words = f"SHA-256 of {', '.join(c.hashes)}"
+    yield Check(name="hashes", ok=known and "content" in c.hashes, detail=words)
+    good = "sealag" in c.versions and all(
+        _KEY.fullmatch(key) and _VERSION.fullmatch(value) for key, value in c.versions.items()
     )
-    yield _direction(data)
-    yield _upper(data, number, worst[0] if worst else None)
-    if data["criterion"] == "certified":
-        yield _contraction(data)
-    yield _asymmetry(data)
+    yield Check(name="versions", ok=good, detail=f"of {', '.join(c.versions)}")
+    keys = [one.key for one in c.assumptions]
+    named = len(set(keys)) == len(keys) > 0 and all(_KEY.fullmatch(key) for key in keys)
+    said = all(one.text.strip() for one in c.assumptions) and all(map(str.strip, c.reasons))
+    yield Check(name="assumptions", ok=named and said, detail=f"{len(keys)} with a name each")
+    open_ = all(
+        key in _BOUNDS and getattr(c, key) is not None and reason.strip()
+        for key, reason in c.left_open.items()
+    )
+    yield Check(name="left open", ok=open_, detail=f"bounds: {', '.join(c.left_open) or 'none'}")
+    positive = (c.D_theta, c.spring_stiffness, c.motor_inertia, c.rotor_inertia)
+    least = [c.spring_damping, c.viscous_friction]
+    drives = [w for w in c.torque_bandwidth if w is not None]
+    good = all(v > 0.0 for values in (*positive, drives) for v in values)
+    good &= all(v >= 0.0 for values in least for v in values)
+    yield Check(
+        name="damping, springs and drives", ok=good, detail=f"{len(c.joints)} joints, positive"
+    )
 
 
-def _instants(data: dict[str, Any], bounds: list[float], proven: list[int]) -> Iterator[Check]:
-    times = np.array(data["time_s"], dtype=float)
-    worst, claimed, smallest = data["worst"], largest_delay(data), min(bounds)
+def _instants(c: Certificate) -> Iterator[Check]:
+    bounds, times, smallest = c.bounds_s, np.array(c.time_s), min(c.bounds_s)
+    proven = [proof.instant for proof in c.proofs]
     yield Check(
         name="instants",
-        ok=len(bounds) == len(times) == data["instants"]
-        and bool((np.diff(times) > 0.0).all())
-        and len(set(proven)) == len(proven),
-        detail=f"{len(bounds)} bounds, {len(times)} times, {data['instants']} claimed",
+        ok=bool((np.diff(times) > 0.0).all()) and len(set(proven)) == len(proven),
+        detail=f"{len(times)} times that increase, {len(proven)} proofs of different ones",
     )
     yield Check(
         name="smallest bound",
-        ok=claimed == smallest and smallest >= 0.0,
-        detail=f"{claimed:.9g} s claimed, {smallest:.9g} s in the list",
+        ok=c.max_delay_s == smallest and smallest >= 0.0,
+        detail=f"{c.max_delay_s:.9g} s claimed, {smallest:.9g} s in the list",
     )
-    at = worst["instant"]
+    at = c.worst.instant
     yield Check(
         name="worst instant",
-        ok=0 <= at < len(bounds) and bounds[at] == smallest and times[at] == worst["time_s"],
-        detail=f"instant {at} at {worst['time_s']} s",
+        ok=bounds[at] == smallest and times[at] == c.worst.time_s,
+        detail=f"instant {at} at {c.worst.time_s} s",
     )
-    shared = [data["common_multiplier_delay_s"], data["time_varying_delay_s"], 0.0]
-    known = [float(delay) for delay in shared if delay is not None]
+    yield Check(
+        name="proof of the worst instant",
+        ok=worst_proof(c) is not None or not 0.0 < c.max_delay_s < math.inf,
+        detail=f"{len(proven)} instants have proofs",
+    )
+    shared = [c.common_multiplier_delay_s, c.time_varying_delay_s]
+    known = [delay for delay in shared if delay is not None]
     yield Check(
         name="shared multipliers prove no more than each instant's own",
-        ok=max(known) <= smallest * (1.0 + 1e-6) and min(known) == 0.0,
-        detail=f"{max(known):.9g} s, {smallest:.9g} s",
+        ok=all(0.0 <= delay <= smallest * (1.0 + 1e-6) for delay in known)
+        and (c.instants > 1 or not known),
+        detail=f"{known} s, {smallest:.9g} s",
     )
 
 
-def _levels(data: dict[str, Any]) -> Check:
-    """Priority levels are rows of J*, from the first to the last."""
-    edges = data["levels"]
-    rows = {len(proof["J_star"]) for proof in data["proofs"]} or {edges[-1]}
-    good = edges[0] == 0 and {edges[-1]} == rows and sorted(set(edges)) == edges
-    return Check(name="priority levels", ok=good, detail=f"rows {edges}")
+def _margins(c: Certificate) -> Iterator[Check]:
+    """What is said of all instants follows from what is said of each."""
+    basis, margins = c.instant_basis, c.instant_margins_s
+    exact = [m for m, b in zip(margins, basis) if b is Basis.EXACT and m is not None]
+    floor = min(exact, default=None)
+    held = all(
+        (m is None) == (b is Basis.OPEN) and (m is None or m >= 0.0) for m, b in zip(margins, basis)
+    )
+    yield Check(
+        name="margins of instants",
+        ok=held and c.local_margin_s == floor,
+        detail=f"{c.local_margin_s} s claimed, smallest exact one {floor} s",
+    )
+    yield Check(
+        name="margins by bounds",
+        ok=all(
+            m == bound > 0.0 and c.criterion is Criterion.CERTIFIED and not coupled(c)
+            for m, b, bound in zip(margins, basis, c.bounds_s)
+            if b is Basis.BOUND
+        )
+        and all(
+            m >= (floor or 0.0)
+            for m, b in zip(margins, basis)
+            if b in (Basis.BOUND, Basis.SEARCHED) and m is not None
+        ),
+        detail=f"{basis.count(Basis.BOUND)} instants: the passive bound of each; "
+        f"{basis.count(Basis.SEARCHED)} searched for crossings; none below the smallest margin",
+    )
+    at = c.critical.instant
+    yield Check(
+        name="critical instant",
+        ok=c.time_s[at] == c.critical.time_s and margins[at] == floor,
+        detail=f"instant {at} at {c.critical.time_s} s",
+    )
+    expected = False if floor == 0.0 else (None if Basis.OPEN in basis else True)
+    rests = c.equilibrium is not None and c.equilibrium.found
+    yield Check(
+        name="stable without delay",
+        ok=(c.stable is expected and (c.unstable_modes > 0) == (floor == 0.0 and rests))
+        or (c.stable is False and floor == 0.0 and not rests),
+        detail=f"{c.stable} claimed with {c.unstable_modes} unstable modes",
+    )
+    rest = c.equilibrium
+    yield Check(
+        name="equilibrium",
+        ok=(c.instants == 1 or rest is None) and (rest is None or rest.moved_rad >= 0.0),
+        detail="none for a motion" if rest is None else f"{rest.moved_rad} rad away",
+    )
 
 
-def _verdict(data: dict[str, Any]) -> Check:
+def _verdict(c: Certificate) -> Check:
     """Status, reasons and delays agree; a bound of 0 is where a condition fails.
 
     A bound over the whole motion that a solver left open below the design's delay is no answer, and
     a law that loses its stability before its bound is not covered by it.
     """
-    largest, delay, yes = largest_delay(data), float(data["delay_s"]), not data["reasons"]
-    shared = [data[name] for name in data["left_open"] if name != "max_delay_s"]
-    margin, certified = data["local_margin_s"], data["criterion"] == "certified"
-    covered = data["criterion"] == "published" or data["feedback"] != "joint"
-    undercut = certified and data["stable"] and margin is not None and margin < largest
+    largest, delay, yes = c.max_delay_s, c.delay_s, not c.reasons
+    shared = [getattr(c, name) for name in c.left_open if name in _BOUNDS[1:]]
+    certified = c.criterion is Criterion.CERTIFIED
+    covered = not certified or c.feedback != "joint"
+    undercut = certified and any(
+        m is not None and basis is Basis.EXACT and 0.0 < m < bound
+        for m, basis, bound in zip(c.instant_margins_s, c.instant_basis, c.bounds_s)
+    )
+    rests = c.equilibrium is None or c.equilibrium.found
     enough = delay <= largest and all(bound is None or delay <= bound for bound in shared)
     return Check(
         name="verdict",
-        ok=data["status"] == ("certified" if yes else "not_certified")
-        and all(data[key] in words for key, words in _WORDS.items())
+        ok=c.status is (Status.CERTIFIED if yes else Status.NOT_CERTIFIED)
         and delay >= 0.0
-        and (yes == (enough and not undercut) or (largest == 0.0 and not yes))
+        and (yes == (enough and not undercut and rests) or (largest == 0.0 and not yes))
         and (covered or largest == 0.0),
-        detail=f"{data['status']} by the {data['criterion']} criterion at {delay} s",
+        detail=f"{c.status} by the {c.criterion} criterion at {delay} s",
     )
 
 
-def _published(data: dict[str, Any]) -> Check:
-    if data["criterion"] == "published":
-        same = data["published_max_delay_s"] == data["max_delay_s"]
-        detail = "it is this certificate's bound"
+def _published(c: Certificate) -> Check:
+    if c.criterion is Criterion.PUBLISHED:
+        same, detail = c.published_max_delay_s == c.max_delay_s, "it is this certificate's bound"
     else:
-        same = data["published_max_delay_s"] is None or data["published_max_delay_s"] >= 0.0
+        same = c.published_max_delay_s >= 0.0
         detail = "the maker's word: its proof is a certificate by the published criterion"
     return Check(name="published bound", ok=same, detail=detail)
 
 
-def _conservatism(data: dict[str, Any]) -> Check:
+def _conservatism(c: Certificate) -> Check:
     """Margin over bound; at least 1 where a design is certified."""
-    ratio, margin, largest = (
-        data["conservatism"],
-        data["local_margin_s"] or 0.0,
-        largest_delay(data),
-    )
-    expected = margin / largest if margin > 0.0 and 0.0 < largest < math.inf else None
-    passive = data["criterion"] == data["status"] == "certified"
+    ratio, margin, largest = c.conservatism, c.local_margin_s or 0.0, c.max_delay_s
+    expected = margin / largest if 0.0 < margin < math.inf and 0.0 < largest < math.inf else None
+    passive = c.criterion == c.status == "certified"
     return Check(
         name="conservatism",
         ok=ratio == expected and not (passive and ratio is not None and ratio < 1.0),
@@ -165,47 +226,14 @@ def _conservatism(data: dict[str, Any]) -> Check:
     )
 
 
-def _unbounded(data: dict[str, Any]) -> Check:
+def _unbounded(c: Certificate) -> Check:
     """A bound without end is claimed only of a law that feeds nothing back."""
-    loop, endless = data["local_loop"], math.isinf(largest_delay(data))
-    silent = loop is not None and not np.array(loop["L"], dtype=float).any()
+    endless = c.max_delay_s == math.inf
+    silent = c.local_loop is not None and not np.array(c.local_loop.A_1).any()
     return Check(
         name="bound without end",
         ok=not endless or silent,
         detail="none is claimed" if not endless else "the frozen loop has no delayed part",
-    )
-
-
-def _direction(data: dict[str, Any]) -> Check:
-    """Shares of the damping power y* D_θ y."""
-    real, imaginary = np.array(data["worst_motion"], dtype=float)
-    power = np.array(data["D_theta"], dtype=float) * (real**2 + imaginary**2)
-    direction = data["worst"]["direction"]
-    gap = np.abs(np.array(list(direction.values()), dtype=float) - power / power.sum()).max()
-    return Check(
-        name="limiting direction",
-        ok=list(direction) == list(data["joints"]) and gap <= AGREEMENT,
-        detail=f"shares of {len(direction)} joints in the worst motion's damping, to {gap:.1e}",
-    )
-
-
-def _upper(data: dict[str, Any], number: Reader, proof: dict[str, Any] | None) -> Check:
-    """(29) and (31) at d ask for d |y* F y| ≤ y* D_θ y of every motion y."""
-    name, largest, upper = "upper end", largest_delay(data), data["max_delay_upper_s"]
-    if proof is None:
-        expected = 0.0 if largest == 0.0 else None
-        words = "nothing is claimed where no bound is positive and finite"
-        return Check(name=name, ok=upper == expected, detail=words)
-    a, b = number(data["worst_motion"])
-    F, D, d = number(proof["F"]), number(data["D_theta"]), number([upper])[0]
-    power = sum(D * (a * a + b * b))
-    real, imaginary = a @ F @ a + b @ F @ b, a @ F @ b - b @ F @ a
-    room = number([(1.0 + AGREEMENT) ** 2])[0]
-    refuted = d * d * (real * real + imaginary * imaginary) * room >= power * power > 0
-    return Check(
-        name=name,
-        ok=upper >= largest and bool(refuted),
-        detail=f"the worst motion turns active by {upper:.9g} s, to {AGREEMENT:.0e}",
     )
 
 
@@ -215,33 +243,35 @@ def _shown(claimed: float, shown: float, *, complete: bool) -> bool:
     return claimed >= shown - room and (not complete or claimed <= shown + room)
 
 
-def _asymmetry(data: dict[str, Any]) -> Check:
-    claimed = math.inf if data["asymmetry"] is None else float(data["asymmetry"])
-    shown = [asymmetry(np.array(proof["F"], dtype=float)) for proof in data["proofs"]]
-    most = max(shown, default=0.0)
-    proven = data["criterion"] == "certified" and largest_delay(data) > 0.0
-    return Check(
-        name="asymmetry",
-        ok=_shown(claimed, most, complete=len(shown) == data["instants"])
-        and not (proven and claimed > SYMMETRY),
-        detail=f"{claimed:.2e} claimed, {most:.2e} at {len(shown)} instants with a proof",
-    )
+def _asymmetry(c: Certificate) -> Check:
+    shown = [asymmetry(np.array(proof.F)) for proof in c.proofs]
+    most, claimed = max(shown, default=0.0), c.asymmetry
+    proven = c.criterion is Criterion.CERTIFIED and c.max_delay_s > 0.0
+    ok = not proven
+    if claimed is not None:
+        ok = _shown(claimed, most, complete=len(shown) == c.instants)
+        ok &= not (proven and claimed > SYMMETRY)
+    words = f"{claimed} claimed, {most:.2e} at {len(shown)} instants with a proof"
+    return Check(name="asymmetry", ok=ok, detail=words)
 
 
-def _contraction(data: dict[str, Any]) -> Check:
+def _contraction(c: Certificate) -> Check:
     """‖K^-½ F_q K^-½‖₂ with F_q = J*ᵀ S J* less the gravity gradient."""
-    K = np.array(data["spring_stiffness"], dtype=float)
-    shown = [_factor(proof, K) for proof in data["proofs"]] if (K > 0.0).all() else [math.inf]
-    claimed, most = float(data["contraction"]), max(shown, default=0.0)
-    needed = data["feedback"] == "static_joint" and largest_delay(data) > 0.0
-    return Check(
-        name="contraction",
-        ok=_shown(claimed, most, complete=len(shown) == data["instants"])
-        and not (needed and claimed >= 1.0),
-        detail=f"{claimed:.6g} claimed, {most:.6g} at {len(shown)} instants with a proof",
-    )
+    if c.criterion is not Criterion.CERTIFIED:
+        words = "the maker's word: the published criterion has another S"
+        return Check(name="contraction", ok=(c.contraction or 0.0) >= 0.0, detail=words)
+    K = np.array(c.spring_stiffness)
+    shown = [_factor(proof, K) for proof in c.proofs] if (K > 0.0).all() else [math.inf]
+    most, claimed = max(shown, default=0.0), c.contraction
+    needed = c.feedback == "static_joint" and c.max_delay_s > 0.0
+    ok = not needed
+    if claimed is not None:
+        ok = _shown(claimed, most, complete=len(shown) == c.instants)
+        ok &= not (needed and claimed >= 1.0)
+    words = f"{claimed} claimed, {most:.6g} at {len(shown)} instants with a proof"
+    return Check(name="contraction", ok=ok, detail=words)
 
 
-def _factor(proof: dict[str, Any], K: Array) -> float:
-    J, S, G = (np.array(proof[key], dtype=float) for key in ("J_star", "stiffness", "F_gravity"))
+def _factor(proof: Proof, K: Array) -> float:
+    J, S, G = (np.array(part) for part in (proof.J_star, proof.stiffness, proof.F_gravity))
     return float(np.linalg.norm((J.T @ S @ J - G) / np.sqrt(np.outer(K, K)), 2))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from sealag.passivity._certificate import Certificate, Criterion, Proof, Window
 from sealag.passivity._checks import Check
 from sealag.passivity._definite import (
     Reader,
@@ -25,80 +26,68 @@ AGREEMENT = 1e-9
 """Relative difference up to which redundant numbers of a file agree (they were rounded)."""
 
 
-def proof_checks(data: dict[str, Any], number: Reader) -> Iterator[Check]:
-    """Check damping, springs, and every instant whose numbers are in the file.
+def proof_checks(c: Certificate, number: Reader) -> Iterator[Check]:
+    """Check every instant whose numbers are in the file, and the common multiplier at them.
 
     Args:
-        data: the certificate as plain data.
+        c: the certificate.
         number: how its numbers are read: doubles or rationals.
-
-    Raises:
-        ValueError: matrices do not fit each other.
     """
-    D, K = number(data["D_theta"]), number(data["spring_stiffness"])
-    n = len(data["joints"])
-    positive = len(D) == len(K) == n and all(v > 0 for v in (*D, *K))
-    words = f"{n} joints, all positive" if positive else "not all are positive"
-    yield Check(name="damping and springs", ok=positive, detail=words)
-    if not positive:
-        return
-    for proof in data["proofs"]:
-        yield from _proof(data, proof, number, D=D, K=K)
-    yield from _common(data, number, D=D)
+    D, K = number(c.D_theta), number(c.spring_stiffness)
+    for proof in c.proofs:
+        yield from _proof(c, proof, number, D=D, K=K)
+    yield from _common(c, number, D=D)
 
 
-def _proof(
-    data: dict[str, Any], proof: dict[str, Any], number: Reader, *, D: Array, K: Array
-) -> Iterator[Check]:
+def _proof(c: Certificate, proof: Proof, number: Reader, *, D: Array, K: Array) -> Iterator[Check]:
     """One instant: delay, stiffness, multipliers."""
-    name, n = f"instant {proof['instant']}", len(D)
-    J, S, G, F = (number(proof[key]) for key in ("J_star", "stiffness", "F_gravity", "F"))
-    W, Q = ([number(block) for block in proof[key]] for key in ("W", "Q"))
-    if F.shape != (n, n) or G.shape != (n, n) or J.shape != (len(S), n):
-        raise ValueError(f"{name} has matrices of another size than its {n} joints")
+    name, n = f"instant {proof.instant}", len(D)
+    J, S, G, F = (
+        number(part) for part in (proof.J_star, proof.stiffness, proof.F_gravity, proof.F)
+    )
+    W, Q = ([number(block) for block in blocks] for blocks in (proof.W, proof.Q))
     yield Check(
         name=f"{name}: claimed delay",
-        ok=data["bounds_s"][proof["instant"]] == proof["delay_s"] and proof["delay_s"] > 0.0,
-        detail=f"{proof['delay_s']:.9g} s",
+        ok=c.bounds_s[proof.instant] == proof.delay_s and proof.delay_s > 0.0,
+        detail=f"{proof.delay_s:.9g} s",
     )
-    yield from _stiffness(name, data, J=J, S=S, G=G, F=F, K=K)
-    d = number([proof["delay_s"]])[0]
-    if data["criterion"] == "certified":
-        loss, M, blocks = W[0], F, [n]
+    yield from _stiffness(name, c, J=J, S=S, G=G, F=F, K=K)
+    d, terms = number([proof.delay_s])[0], None
+    if c.criterion is Criterion.CERTIFIED:
+        loss, M = W[0], F
     else:
-        edges = data["levels"]
-        blocks = [after - first for first, after in pairwise(edges)]
-        loss, M = _levels(J, S, W, edges)
-    sizes = [block.shape for block in W] == [(rows, rows) for rows in blocks] and M.shape[1] == sum(
-        blocks
-    )
-    if not sizes:
-        raise ValueError(f"{name} has multipliers of other sizes than {blocks}")
+        apart = _apart(S, c.levels)
+        words = f"no task stiffness between levels {c.levels}"
+        yield Check(name=f"{name}: priority levels", ok=apart, detail=words)
+        loss, M = _levels(J, S, W, c.levels)
+        terms = _terms(proof, n)
     gap = max(size(d * q - w) / max(size(w), 1e-300) for q, w in zip(Q, W, strict=True))
     yield Check(name=f"{name}: W = d Q", ok=gap <= AGREEMENT, detail=f"to {gap:.1e}")
-    terms = _terms(proof, n) if data["criterion"] != "certified" else None
     yield _inequality(f"{name}: matrix inequality", D, d, loss=loss, M=M, W=W, terms=terms)
 
 
+def _apart(S: Array, edges: Sequence[int]) -> bool:
+    """Whether S couples no priority levels of (31)."""
+    rest = S.copy()
+    for first, after in pairwise(edges):
+        rest[first:after, first:after] = 0 * S[first:after, first:after]
+    return not any(value != 0 for value in rest.ravel())
+
+
 def _levels(J: Array, S: Array, W: Sequence[Array], edges: Sequence[int]) -> tuple[Array, Array]:
-    """Σ J_iᵀ W_i J_i and M_i = J_iᵀ S_i side by side; S must not couple the levels of (31)."""
+    """Σ J_iᵀ W_i J_i and M_i = J_iᵀ S_i side by side."""
     rows = [slice(first, after) for first, after in pairwise(edges)]
-    apart = S.copy()
-    for at in rows:
-        apart[at, at] = 0 * S[at, at]
-    if any(value != 0 for value in apart.ravel()):
-        raise ValueError("the task stiffness couples priority levels")
     loss = sum(J[at].T @ block @ J[at] for at, block in zip(rows, W, strict=True))
     return loss, np.hstack([J[at].T @ S[at, at] for at in rows])  # pyright: ignore
 
 
-def _terms(proof: dict[str, Any], n: int) -> tuple[Array, Array]:
+def _terms(proof: Proof, n: int) -> tuple[Array, Array]:
     """Absolute sums behind Σ J_iᵀ W_i J_i and J*ᵀ S, for the rounding bound."""
-    J, S = (np.abs(np.array(proof[key], dtype=float)) for key in ("J_star", "stiffness"))
+    J, S = (np.abs(np.array(part)) for part in (proof.J_star, proof.stiffness))
     loss, first = np.zeros((n, n)), 0
-    for block in proof["W"]:
+    for block in proof.W:
         at = slice(first, first + len(block))
-        loss += J[at].T @ np.abs(np.array(block, dtype=float)) @ J[at]
+        loss += J[at].T @ np.abs(np.array(block)) @ J[at]
         first += len(block)
     return loss, J.T @ S
 
@@ -144,17 +133,17 @@ def _dissipates(
 
 
 def _stiffness(
-    name: str, data: dict[str, Any], *, J: Array, S: Array, G: Array, F: Array, K: Array
+    name: str, c: Certificate, *, J: Array, S: Array, G: Array, F: Array, K: Array
 ) -> Iterator[Check]:
     """That F is the stiffness of the law that the file names."""
-    certified = data["criterion"] == "certified"
+    certified = c.criterion is Criterion.CERTIFIED
     yield Check(
         name=f"{name}: gravity gradient",
-        ok=data["gravity"] == "feedback" or size(G) == 0.0,
-        detail=f"gravity compensation is {data['gravity']}",
+        ok=c.gravity == "feedback" or size(G) == 0.0,
+        detail=f"gravity compensation is {c.gravity}",
     )
     F_q = J.T @ S @ J - (G if certified else 0 * G)
-    if certified and data["feedback"] == "static_joint":
+    if certified and c.feedback == "static_joint":
         difference, scale = F - F @ (F_q / K[:, None]) - F_q, size(F) + size(F_q)
     else:
         difference, scale = F - F_q, size(F)
@@ -176,7 +165,7 @@ def _stiffness(
         ok=ok and crooked <= SYMMETRY,
         detail=f"asymmetry {crooked:.1e}, {slack}",
     )
-    if data["feedback"] == "static_joint":
+    if c.feedback == "static_joint":
         even = (F_q + F_q.T) / 2
         ok = all(positive_definite(np.diag(K) + sign * even)[1] for sign in (-1, 1))
         yield Check(
@@ -195,98 +184,103 @@ def asymmetry(F: Array) -> float:
     return size(F - F.T) / max(size(F + F.T), 1e-300)
 
 
-def _common(data: dict[str, Any], number: Reader, *, D: Array) -> Iterator[Check]:
+def _common(c: Certificate, number: Reader, *, D: Array) -> Iterator[Check]:
     """The multiplier shared by all instants, at those whose numbers are in the file."""
-    longest, W = data["common_multiplier_delay_s"], data["common_multiplier"]
-    if not longest:
-        return
-    if W is None:
-        yield Check(name="common multiplier", ok=False, detail="a delay without its multiplier")
+    longest, W = c.common_multiplier_delay_s, c.common_multiplier
+    yield _stated("common multiplier", longest, W is not None)
+    if not longest or W is None or longest == math.inf:
         return
     d, blocks = number([longest])[0], [number(W)]
     bad = []
-    for proof in data["proofs"]:
-        F = number(proof["F"])
+    for proof in c.proofs:
+        F = number(proof.F)
         here = _inequality("", D, d, loss=blocks[0], M=F, W=blocks)
-        bad += [] if here.ok else [f"instant {proof['instant']}: {here.detail}"]
+        bad += [] if here.ok else [f"instant {proof.instant}: {here.detail}"]
     yield Check(
-        name=f"common multiplier at {len(data['proofs'])} of {data['instants']} instants",
-        ok=not bad and bool(data["proofs"]),
+        name=f"common multiplier at {len(c.proofs)} of {c.instants} instants",
+        ok=not bad and bool(c.proofs),
         detail=bad[0] if bad else f"[[2D - W, dF], [dF', W]] > 0 at each for {longest:.9g} s",
     )
 
 
-def window_checks(data: dict[str, Any], number: Reader) -> Iterator[Check]:
+def _stated(name: str, longest: float | None, there: bool) -> Check:
+    """A multiplier belongs to a positive finite delay, and only to one."""
+    needed = longest is not None and 0.0 < longest < math.inf
+    words = f"{'there' if there else 'missing'} for a delay of {longest} s"
+    return Check(name=f"{name} is stated", ok=needed == there, detail=words)
+
+
+def window_checks(c: Certificate, number: Reader) -> Iterator[Check]:
     """Check the time-varying bound: every vertex with the ball around it, in every window.
 
     ‖[D^-½C, d D^-½FC^-ᵀ]‖₂ ≤ √2 − r at the vertices, W = C Cᵀ, gives ≤ √2 in the whole window; it
     says [[(√2 − r)² D − W, dF], [dFᵀ, W]] ⪰ 0.
 
     Args:
-        data: the certificate as plain data.
+        c: the certificate.
         number: how its numbers are read: doubles or rationals.
     """
-    longest, W = data["time_varying_delay_s"], data["time_varying_multiplier"]
-    windows = data["time_varying_windows"]
-    if not longest:
+    longest, W = c.time_varying_delay_s, c.time_varying_multiplier
+    windows = c.time_varying_windows
+    yield _stated("time-varying multiplier", longest, W is not None)
+    yield _stated("time-varying windows", longest, bool(windows))
+    if not longest or W is None or not windows or longest == math.inf:
         return
-    if W is None or not windows:
-        yield Check(name="time-varying multiplier", ok=False, detail="a delay without its numbers")
-        return
-    D, d, block = number(data["D_theta"]), number([longest])[0], number(W)
-    bad, vertices = [] if bool((block == block.T).all()) else ["the multiplier is crooked"], 0
+    D, d, block = number(c.D_theta), number([longest])[0], number(W)
+    bad, vertices = [] if bool((block == block.T).all()) else ["the multiplier is asymmetric"], 0
     for window in windows:
-        radius = float(window["radius"])
-        if not 0.0 <= radius < 1.0:
-            raise ValueError(f"a window's radius is {radius}")
-        factor = number([(math.sqrt(2.0) - radius) ** 2 * (1.0 - 1e-12)])[0]
+        place = f"instants {window.first} … {window.last}"
+        if not (0.0 <= window.radius < 1.0 and window.first <= window.last):
+            bad.append(f"{place} and radius {window.radius} are no window")
+            continue
+        factor = number([(math.sqrt(2.0) - window.radius) ** 2 * (1.0 - 1e-12)])[0]
         for F in _vertices(window, number):
             vertices += 1
             slack, ok = _dissipates(D, d, loss=block, M=F, W=[block], factor=factor)
-            bad += [] if ok else [f"instants {window['first']} … {window['last']}: {slack}"]
+            bad += [] if ok else [f"{place}: {slack}"]
     good = f"{vertices} vertices with their balls dissipate for {longest:.9g} s"
     yield Check(
         name=f"time-varying multiplier in all {len(windows)} windows",
         ok=not bad,
         detail=bad[0] if bad else good,
     )
-    held = np.zeros(data["instants"], dtype=bool)
+    held = np.zeros(c.instants, dtype=bool)
     for window in windows:
-        held[window["first"] : window["last"] + 1] = True
+        held[window.first : window.last + 1] = True
     text = f"{held.sum()} of {len(held)} instants lie in a window"
     yield Check(name="time-varying windows cover the motion", ok=bool(held.all()), detail=text)
     if not bad:
-        yield from _members(data, W=as_doubles(block), D=as_doubles(D), d=float(longest))
+        yield _members(c, W=as_doubles(block), D=as_doubles(D), d=longest)
 
 
-def _vertices(window: dict[str, Any], number: Reader) -> Iterator[Array]:
-    corners = [number(window["centre"])]
-    for values in window["axes"]:
+def _vertices(window: Window, number: Reader) -> Iterator[Array]:
+    corners = [number(window.centre)]
+    for values in window.axes:
         axis = number(values)
         corners = [corner + sign * axis for corner in corners for sign in (-1, 1)]
     yield from corners
 
 
-def _members(data: dict[str, Any], *, W: Array, D: Array, d: float) -> Iterator[Check]:
+def _members(c: Certificate, *, W: Array, D: Array, d: float) -> Check:
     """That the instants with numbers lie in the sets, in doubles."""
     root, C = np.sqrt(D), np.linalg.cholesky(W)
     outside, count = [], 0
-    for proof in data["proofs"]:
-        for window in data["time_varying_windows"]:
-            if not window["first"] <= proof["instant"] <= window["last"]:
+    for proof in c.proofs:
+        for window in c.time_varying_windows:
+            if not window.first <= proof.instant <= window.last:
                 continue
             count += 1
-            rest = (np.array(proof["F"]) - np.array(window["centre"])) / root[:, None]
-            axes = [np.array(axis) / root[:, None] for axis in window["axes"]]
+            rest = (np.array(proof.F) - np.array(window.centre)) / root[:, None]
+            axes = [np.array(axis) / root[:, None] for axis in window.axes]
             if axes:
                 basis = np.array([axis.ravel() for axis in axes]).T
                 share = np.linalg.lstsq(basis, rest.ravel(), rcond=None)[0]
                 rest = rest - (basis @ np.clip(share, -1.0, 1.0)).reshape(rest.shape)
             far = d * float(np.linalg.norm(np.linalg.solve(C, rest.T), 2))
-            if not far <= window["radius"] + AGREEMENT:
-                outside.append(f"instant {proof['instant']} is {far:.3e} from its box")
-    yield Check(
-        name=f"time-varying windows hold the {len(data['proofs'])} instants with a proof",
+            if not far <= window.radius + AGREEMENT:
+                outside.append(f"instant {proof.instant} is {far:.3e} from its box")
+    return Check(
+        name=f"time-varying windows hold the {len(c.proofs)} instants with a proof",
         ok=not outside,
         detail=outside[0] if outside else f"{count} memberships, floating point",
     )

@@ -1,148 +1,195 @@
-"""The exact local margin of a certificate, checked again in floating point from its frozen loop.
-
-ẍ + R ẋ + P x + L x(t − d) = 0. With Δ_z(ω) = P − ω² + jωR + zL and z = e^{-jωd}, the phase of
-det Δ_z(ω) / det Δ_1(ω) along the imaginary axis turns once for every two roots that the delay d
-adds to the right half plane (argument principle; both determinants have the same leading term).
-"""
+"""The exact local margin of a certificate, checked again in doubles from its frozen loop."""
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
+from sealag.passivity._axis import (
+    EARLIER,
+    DelayedLoop,
+    earliest_crossing,
+    roots_with_error,
+    unstable_roots,
+)
+from sealag.passivity._certificate import Certificate, Criterion, LocalLoop
 from sealag.passivity._checks import Check
-from sealag.passivity._definite import EPS
 from sealag.passivity._inequalities import AGREEMENT
 from sealag.typing import Array
-
-_SHARES = (0.25, 0.5, 0.75, 0.999)
-"""Shares of the first crossing at which roots are counted."""
 
 COUPLED = 1e-6
 """Share of the delayed stiffness from which an answer to passive motions counts."""
 
+_SHARES = (0.25, 0.5, 0.75, 0.999)
+"""Shares of the first crossing at which roots are counted where the sweep does not apply."""
+
 _STRUCTURE = 1e-8
-_TURN = 0.5
-_MOST = 60_000
-_CHUNK = 512
 
 
-def local_checks(data: dict[str, Any]) -> Iterator[Check]:
-    """Check margin, first crossing, unstable modes and the potential's minimum, in doubles.
+def local_checks(c: Certificate) -> Iterator[Check]:
+    """Check margin, first crossing and unstable modes at the critical instant.
 
     Args:
-        data: the certificate as plain data.
-
-    Raises:
-        ValueError: matrices do not fit each other.
+        c: the certificate.
     """
-    loop, margin, crossing = data["local_loop"], data["local_margin_s"], data["first_crossing_s"]
+    loop, exact = c.local_loop, c.instant_basis[c.critical.instant] == "exact"
     if loop is None:
-        silent = margin is None and crossing is None and data["stable"] is None
         words = "no frozen loop is in the file, and nothing is claimed of it"
-        ok = silent and data["unstable_modes"] == 0
-        yield Check(name="local margin", ok=ok, detail=words if ok else "claimed without a loop")
+        yield Check(name="frozen loop", ok=not exact and c.unstable_modes == 0, detail=words)
         return
-    P, R, L, V = (np.array(loop[key], dtype=float) for key in ("P", "R", "L", "symmetries"))
-    V = V.reshape(len(P), -1)
-    if not P.shape == R.shape == L.shape == (len(P), len(P)) or not len(P) >= len(data["joints"]):
-        raise ValueError("the frozen loop's matrices do not fit each other")
-    yield _motors(data, P=P, R=R, L=L)
-    lost = max((float(np.abs(A @ V).max(initial=0.0)) / _size(A) for A in (P, R, L)), default=0.0)
-    yield Check(
-        name="frozen loop: symmetries",
-        ok=lost <= _STRUCTURE,
-        detail=f"{V.shape[1]} directions along which nothing acts, to {lost:.1e}",
-    )
-    rest = np.linalg.svd(V, full_matrices=True)[0][:, np.linalg.matrix_rank(V) :]
-    P, R, L = (rest.T @ A @ rest for A in (P, R, L))
-    yield _minimum(data, P + L, coupled=_coupled(data))
-    roots, error = _roots(P + L, R)
-    yield _unstable(data, roots, error)
-    words = f"{margin} s with a first crossing at {crossing} s"
-    expected = 0.0 if data["unstable_modes"] else crossing
-    yield Check(name="local margin", ok=margin == expected, detail=words)
-    if crossing is not None:
-        yield _on_axis(P, R, L, delay=float(crossing), omega=float(loop["frequency_rad_s"]))
-        yield _count(P, R, L, roots, delay=float(crossing), omega=float(loop["frequency_rad_s"]))
+    yield from _structure(c, loop)
+    yield _symmetric(loop)
+    reduced = _without_symmetries(loop)
+    yield _unstable(c, reduced)
+    yield _agree(c)
+    if c.first_crossing_s is not None:
+        yield from _crossing(c, loop, reduced, c.first_crossing_s)
+
+
+def coupled(c: Certificate) -> bool:
+    """Tell whether the law answers to motions that the motors do not determine.
+
+    Args:
+        c: the certificate.
+    """
+    loop = c.local_loop
+    if loop is None or c.feedback == "joint":
+        return False
+    A_1, motors = np.array(loop.A_1), {f"theta:{name}" for name in c.joints}
+    others = [k for k, name in enumerate(loop.states) if name not in motors]
+    aside = np.abs(A_1[:, others]).max(initial=0.0)
+    return bool(aside > COUPLED * _size(A_1))
 
 
 def _size(A: Array) -> float:
     return max(float(np.abs(A).max(initial=0.0)), 1e-300)
 
 
-def _motors(data: dict[str, Any], *, P: Array, R: Array, L: Array) -> Check:
-    """That the motors' rows hold the file's K, D_θ and F over B_s."""
-    D, K = (np.array(data[key], dtype=float) for key in ("D_theta", "spring_stiffness"))
-    loop = data["local_loop"]
-    B, D_s = (np.array(loop[key], dtype=float) for key in ("motor_inertia", "spring_damping"))
-    k = len(P) - len(K)
-    gaps = [np.abs(B[:, None] * P[k:, k:] - np.diag(K)).max() / K.max()]
-    gaps += [np.abs(B[:, None] * R[k:, k:] - np.diag(D + D_s)).max() / D.max()]
-    proof = [p for p in data["proofs"] if p["instant"] == data["worst"]["instant"]]
-    if proof and data["criterion"] == "certified":
-        F = np.array(proof[0]["F"], dtype=float)
-        gaps += [np.abs(B[:, None] * L[k:, k:] - F).max() / _size(F)]
-        gaps += [np.abs(L[:k]).max(initial=0.0) / _size(L)]
+def _structure(c: Certificate, loop: LocalLoop) -> Iterator[Check]:
+    """Names of states, rates of positions, and the motors' rows as the design has them."""
+    joints = [f"theta:{name}" for name in c.joints]
+    drives, tank = (
+        [name for name in loop.states if name.startswith(kind)] for kind in ("drive:", "tank:")
+    )
+    free = [f"z{k}" for k in range((len(loop.states) - len(drives) - len(tank)) // 2 - len(joints))]
+    positions = [*free, *joints]
+    rates = [f"d/dt {name}" for name in positions]
+    wanted = [f"drive:{j}" for j, w in zip(c.joints, c.torque_bandwidth) if w is not None]
+    known = [*positions, *rates, *drives, *tank] == loop.states and drives in ([], wanted)
+    words = f"{len(free)} free, {len(joints)} motors, {len(drives)} drives, {len(tank)} of a tank"
+    yield Check(name="frozen loop: states", ok=known, detail=words)
+    if not known:
+        return
+    A_0, late = np.array(loop.A_0), [np.array(A) for A in (loop.A_1, loop.A_e) if A is not None]
+    half = len(positions)
+    unit = np.eye(half, len(A_0), k=half)
+    same = (A_0[:half] == unit).all() and not any(A[:half].any() for A in late)
+    words = "each position changes by its rate"
+    yield Check(name="frozen loop: positions", ok=bool(same), detail=words)
+    if loop.A_e is None and not drives:
+        yield _motors(c, A_0=A_0, A_1=late[0], free=len(free), half=half)
+
+
+def _motors(c: Certificate, *, A_0: Array, A_1: Array, free: int, half: int) -> Check:
+    """B_s θ̈ + (D_θ + D_s + viscous) θ̇ + K θ = … − F θ(t − d), entry by entry."""
+    n = len(c.joints)
+    B, K, D = np.array(c.motor_inertia), np.array(c.spring_stiffness), np.array(c.D_theta)
+    damping = D + np.array(c.spring_damping) + np.array(c.viscous_friction)
+    angle, rate = slice(free, half), slice(half + free, half + free + n)
+    held = A_0[rate, angle] * B[:, None]
+    gaps = [np.abs(held + np.diag(K)).max() / K.max()]
+    gaps += [np.abs(A_0[rate, rate] * B[:, None] + np.diag(damping)).max() / damping.max()]
+    proof = [p for p in c.proofs if p.instant == c.worst.instant == c.critical.instant]
+    stiff = c.feedback not in ("joint", "static_joint_tank")
+    if proof and c.criterion is Criterion.CERTIFIED and stiff:
+        F = np.array(proof[0].F)
+        gaps += [np.abs(A_1[rate, angle] * B[:, None] + F).max() / _size(F)]
+        others = np.delete(np.arange(len(A_1)), np.arange(rate.start, rate.stop))
+        gaps += [np.abs(A_1[others]).max(initial=0.0) / _size(A_1)]
+        gaps += [np.abs(A_1[:, half:]).max(initial=0.0) / _size(A_1)]
     gap = float(max(gaps))
+    words = f"K, D_θ, D_s and F of the file over B_s, to {gap:.1e}"
+    return Check(name="frozen loop: motors", ok=gap <= AGREEMENT, detail=words)
+
+
+def _parts(loop: LocalLoop) -> list[Array]:
+    return [np.array(A) for A in (loop.A_0, loop.A_1, loop.A_e) if A is not None]
+
+
+def _given(loop: LocalLoop) -> Array:
+    return np.array(loop.symmetries).reshape(len(loop.states), -1)
+
+
+def _symmetric(loop: LocalLoop) -> Check:
+    V = _given(loop)
+    lost = max(float(np.abs(A @ V).max(initial=0.0)) / _size(A) for A in _parts(loop))
+    independent = np.linalg.matrix_rank(V) == V.shape[1] if V.size else True
+    unit = bool((np.abs(np.linalg.norm(V, axis=0) - 1.0) <= _STRUCTURE).all())
     return Check(
-        name="frozen loop: motors",
-        ok=bool((B > 0.0).all() and (D_s >= 0.0).all()) and gap <= AGREEMENT,
-        detail=f"K, D and F of the file over the motors' inertia, to {max(gap, 0.0):.1e}",
+        name="frozen loop: symmetries",
+        ok=lost <= _STRUCTURE and bool(independent) and unit,
+        detail=f"{V.shape[1]} directions along which nothing acts, to {lost:.1e}",
     )
 
 
-def _coupled(data: dict[str, Any]) -> bool:
-    """Whether the law answers to motions of the base besides those of the motors."""
-    L = np.array(data["local_loop"]["L"], dtype=float)
-    aside = np.abs(L[:, : len(L) - len(data["joints"])]).max(initial=0.0)
-    return data["feedback"] != "joint" and bool(aside > COUPLED * _size(L))
+def _without_symmetries(loop: LocalLoop) -> DelayedLoop:
+    """Divide out the symmetries, and rates along them that last: A_0 w = v, A_1 w = A_e w = 0."""
+    V, parts = _given(loop), _parts(loop)
+    if V.size:
+        shift = np.zeros((len(V), len(V)))
+        for k, name in enumerate(loop.states):
+            if f"d/dt {name}" in loop.states:
+                shift[loop.states.index(f"d/dt {name}"), k] = 1.0
+        W = shift @ V
+        kept = np.abs(parts[0] @ W - V).max(axis=0) <= _STRUCTURE * _size(V)
+        for A in parts[1:]:
+            kept &= np.abs(A @ W).max(axis=0) <= _STRUCTURE * _size(A)
+        basis = np.hstack([V, W[:, kept]])
+        rest = np.linalg.svd(basis, full_matrices=True)[0][:, np.linalg.matrix_rank(basis) :]
+        parts = [rest.T @ A @ rest for A in parts]
+    A_e = parts[2] if len(parts) > 2 else None
+    return DelayedLoop(A_0=parts[0], A_1=parts[1], A_e=A_e, embedded=loop.embedded_delay_s)
 
 
-def _minimum(data: dict[str, Any], stiffness: Array, *, coupled: bool) -> Check:
-    """M⁻¹ ∂²V, with M ≻ 0, has as many positive eigenvalues as the Hessian ∂²V."""
-    if coupled:
-        return Check(
-            name="stable without delay",
-            ok=data["stable"] in (None, data["unstable_modes"] == 0),
-            detail=f"{data['stable']} claimed; the law has no potential where it answers to "
-            "passive motions of the base, so that the unstable modes decide",
-        )
-    values = np.linalg.eigvals(stiffness)
-    lowest = float(values.real.min(initial=math.inf))
-    room = 1e-9 * _size(values)
-    claimed = data["stable"]
-    ok = claimed is None or (claimed and lowest > 0.0) or (not claimed and lowest <= room)
-    words = f"lowest squared frequency {lowest:.6g} 1/s2"
-    return Check(name="potential has a minimum", ok=ok, detail=f"{claimed} claimed, {words}")
-
-
-def _roots(P: Array, R: Array) -> tuple[Array, Array]:
-    """Eigenvalues of ẍ + R ẋ + P x = 0 with first-order bounds of their rounding errors."""
-    rate = math.sqrt(_size(P))
-    eye = np.eye(len(P))
-    A = np.block([[0.0 * eye, rate * eye], [-P / rate, -R]])
-    values, X = np.linalg.eig(A)
-    backward = 8.0 * len(A) * EPS * float(np.linalg.norm(A, 2))
-    condition = np.linalg.norm(X, axis=0) * np.linalg.norm(np.linalg.inv(X), axis=1)
-    worst = np.cbrt(backward * float(np.linalg.norm(A, 2)) ** 2)
-    return values, np.minimum(backward * condition, worst)
-
-
-def _unstable(data: dict[str, Any], roots: Array, error: Array) -> Check:
+def _unstable(c: Certificate, loop: DelayedLoop) -> Check:
+    name, claimed = "unstable modes without delay", c.unstable_modes
+    if loop.A_e is not None:
+        found = unstable_roots(loop, 0.0, omega=None)
+        words = f"{claimed} claimed, {found} counted, argument principle in floating point"
+        return Check(name=name, ok=found == claimed, detail=words)
+    roots, error = roots_with_error(loop.sum)
     sure, doubtful = int((roots.real > error).sum()), int((np.abs(roots.real) <= error).sum())
-    claimed = data["unstable_modes"]
-    return Check(
-        name="unstable modes without delay",
-        ok=sure <= claimed <= sure + doubtful,
-        detail=f"{claimed} claimed, {sure} right of the axis, {doubtful} on it, floating point",
-    )
+    words = f"{claimed} claimed, {sure} right of the axis, {doubtful} on it, floating point"
+    return Check(name=name, ok=sure <= claimed <= sure + doubtful, detail=words)
 
 
-def _on_axis(P: Array, R: Array, L: Array, *, delay: float, omega: float) -> Check:
-    """Whether jω is an eigenvalue of the loop with the delayed part times e^{-jωd}."""
-    roots, error = _roots(P + np.exp(-1j * omega * delay) * L, R)
+def _agree(c: Certificate) -> Check:
+    """The margin is the first crossing, or 0 where a mode is unstable."""
+    here, loop = c.instant_margins_s[c.critical.instant], c.local_loop
+    ok = here == (0.0 if here == 0.0 else c.first_crossing_s)
+    if loop is not None:
+        finite = c.first_crossing_s is not None and c.first_crossing_s < math.inf
+        ok &= (loop.frequency_rad_s is not None) == finite
+        ok &= loop.embedded_delay_s == 0.0 if loop.A_e is None else loop.embedded_delay_s > 0.0
+    words = f"{here} s with a first crossing at {c.first_crossing_s} s"
+    return Check(name="local margin", ok=ok, detail=words)
+
+
+def _crossing(
+    c: Certificate, loop: LocalLoop, reduced: DelayedLoop, crossing: float
+) -> Iterator[Check]:
+    omega = loop.frequency_rad_s
+    if omega is not None and crossing < math.inf:
+        yield _on_axis(reduced, delay=crossing, omega=omega)
+    if c.unstable_modes == 0 and reduced.A_e is None:
+        yield _swept(reduced, crossing)
+    else:
+        yield _counted(reduced, crossing, omega=omega, before=c.unstable_modes)
+
+
+def _on_axis(loop: DelayedLoop, *, delay: float, omega: float) -> Check:
+    """Whether jω is an eigenvalue of the loop with its late parts turned by their phases."""
+    roots, error = roots_with_error(loop.at(np.array([omega]), delay)[0])
     at = int(np.abs(roots - 1j * omega).argmin())
     far, room = float(abs(roots[at] - 1j * omega)), float(error[at]) + 1e-9 * omega
     return Check(
@@ -152,63 +199,31 @@ def _on_axis(P: Array, R: Array, L: Array, *, delay: float, omega: float) -> Che
     )
 
 
-def _count(P: Array, R: Array, L: Array, roots: Array, *, delay: float, omega: float) -> Check:
-    """Roots that delays below the first crossing add to the right half plane: none; a loop that is
-    unstable without delay may lose some there."""
-    added = [_added(P, R, L, roots, delay=share * delay, omega=omega) for share in _SHARES]
-    at = ", ".join(f"{share * delay:.6g}" for share in _SHARES)
-    words = ", ".join("?" if number is None else f"{number:+d}" for number in added)
+def _swept(loop: DelayedLoop, crossing: float) -> Check:
+    limit = crossing * (1.0 - EARLIER)
+    found = earliest_crossing(loop.A_0, loop.A_1, limit=limit)
+    words = "all delays are excluded" if found >= limit else f"{found:.9g} s is not excluded"
+    return Check(
+        name="no root crosses before",
+        ok=found >= limit,
+        detail=f"{words} below {limit:.9g} s, eigenvalue discs in floating point",
+    )
+
+
+def _counted(loop: DelayedLoop, crossing: float, *, omega: float | None, before: int) -> Check:
+    """Roots right of the axis at delays below the first crossing, or at some where there is none:
+    a loop that is unstable without delay may lose some, and gains none."""
+    scale = crossing if crossing < math.inf else 100.0 / max(_size(loop.sum), 1e-300)
+    delays = [share * scale for share in _SHARES]
+    found = [unstable_roots(loop, delay, omega=omega) for delay in delays]
+    at = ", ".join(f"{delay:.6g}" for delay in delays)
+    words = ", ".join("?" if number is None else f"{number}" for number in found)
     return Check(
         name="no root crosses before",
         ok=all(
-            after is not None and before is not None and after <= before
-            for before, after in zip([0, *added], added)
+            after is not None and first is not None and after <= first
+            for first, after in zip([before, *found], found)
         ),
         detail=f"{words} roots right of the axis with delays of {at} s, argument principle in "
         "floating point",
     )
-
-
-def _added(P: Array, R: Array, L: Array, roots: Array, *, delay: float, omega: float) -> int | None:
-    """Roots in the right half plane with the delay less those without; None if unresolved."""
-    grid = _grid(roots, omega)
-    values = _ratio(P, R, L, grid, delay)
-    while len(grid) < _MOST:
-        step = values[1:] / values[:-1]
-        turn = np.maximum(np.abs(np.angle(step)), np.abs(np.log(np.abs(step))))
-        far = np.abs(values - 1.0)
-        late = (np.diff(grid) * delay > _TURN) & (np.maximum(far[1:], far[:-1]) > 0.1)
-        split = np.flatnonzero(~(turn <= _TURN) | late)
-        split = split[np.diff(grid)[split] > 1e-13 * grid[split]]
-        if not len(split):
-            turns = -float(np.angle(step).sum()) / math.pi
-            settled = abs(values[-1] - 1.0) < 0.1 and abs(turns - round(turns)) < 0.1
-            return round(turns) if settled else None
-        fresh = (grid[split] + grid[split + 1]) / 2.0
-        order = np.argsort(np.concatenate([grid, fresh]), kind="stable")
-        grid = np.concatenate([grid, fresh])[order]
-        values = np.concatenate([values, _ratio(P, R, L, fresh, delay)])[order]
-    return None
-
-
-def _grid(roots: Array, omega: float) -> Array:
-    """Frequencies to begin with: all decades, and close to roots and the crossing."""
-    sizes = np.abs(roots)
-    low, high = 1e-4 * min(float(sizes.min()), omega), 30.0 * float(sizes.max())
-    spread = np.concatenate([-np.geomspace(1e-3, 3.0, 6)[::-1], [0.0], np.geomspace(1e-3, 3.0, 6)])
-    near = roots.imag[:, None] + spread * np.abs(roots.real)[:, None]
-    close = omega * (1.0 + 1e-2 * spread)
-    grid = np.concatenate([np.geomspace(low, high, 300), near.ravel(), close])
-    return np.unique(grid[(grid >= low) & (grid <= high)])
-
-
-def _ratio(P: Array, R: Array, L: Array, omega: Array, delay: float) -> Array:
-    """det Δ_z(ω) / det Δ_1(ω), (N,)."""
-    out = np.empty(len(omega), dtype=complex)
-    for first in range(0, len(omega), _CHUNK):
-        w = omega[first : first + _CHUNK, None, None]
-        free = P + L - w**2 * np.eye(len(P)) + 1j * w * R
-        sign, size = np.linalg.slogdet(free + (np.exp(-1j * w * delay) - 1.0) * L)
-        sign_0, size_0 = np.linalg.slogdet(free)
-        out[first : first + _CHUNK] = sign / sign_0 * np.exp(size - size_0)
-    return out

@@ -36,7 +36,7 @@ def limits_section(
         for k, damping in enumerate(planned.abduction_damping)
     ]
     for before, after in zip(planned.certified, simulated.certified, strict=True):
-        name = f"certified, {before.feedback.value}, {before.form.value}, gravity {before.gravity}"
+        name = f"certified, {before.signal}, {before.form.value}, gravity {before.gravity}"
         bounds.append(
             [name.replace("_", " ")]
             + [ms(v.delay_s.min()) if not v.reason else Cell(text="refused", css="number")

@@ -151,7 +151,7 @@ def _certified_blocks(figure: Figure4) -> list[Text | Figure | Table]:
         good = not variant.reason
         rows.append(
             [
-                f"{variant.feedback.value.replace('_', ' ')}",
+                f"{variant.signal.replace('_', ' ')}",
                 f"{variant.form.value}",
                 f"{variant.gravity.value}",
                 Cell(
@@ -226,7 +226,7 @@ def _figure_csv(figure: Figure4) -> str:
 
 def _instants_csv(figure: Figure4) -> str:
     head = ["time_s", *(f"published_delay_s_D{d:g}" for d in figure.abduction_damping)]
-    head += [f"certified_delay_s_{v.form}_{v.feedback}_{v.gravity}" for v in figure.certified]
+    head += [f"certified_delay_s_{v.form}_{v.signal}_{v.gravity}" for v in figure.certified]
     columns = [figure.time, *figure.instants_delay_s, *(v.delay_s for v in figure.certified)]
     return _csv(head, np.column_stack(columns))
 

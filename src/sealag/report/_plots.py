@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sealag.paper import DelayMap, Figure4, TorqueTrace, Walk
-from sealag.whole_body import Feedback, StiffnessForm
+from sealag.whole_body import StaticJoint, StiffnessForm
 
 COLOURS = ("#0b6e99", "#c0561f", "#5b7f2b")
 
@@ -52,7 +52,7 @@ def plot_figure_4(figure: Figure4) -> str:
                 figure.alpha, delay * 1e3, "-o", ms=3.5, color=colour,
                 label=f"(29), D_θ[0] = {damping:g} Nms/rad",
             )  # fmt: skip
-        static = _variant(figure, Feedback.STATIC_JOINT)
+        static = _variant(figure, StaticJoint.name)
         axes.plot(
             figure.alpha, figure.alpha * static * 1e3, "--", color="#444",
             label="certified, q̄(θ) fed back, D_θ[0] = 10",
@@ -66,11 +66,11 @@ def plot_figure_4(figure: Figure4) -> str:
         return _svg(drawing)
 
 
-def _variant(figure: Figure4, feedback: Feedback) -> float:
+def _variant(figure: Figure4, signal: str) -> float:
     return next(
         float(v.delay_s.min())
         for v in figure.certified
-        if v.feedback is feedback and v.form is StiffnessForm.SYMMETRIC
+        if v.signal == signal and v.form is StiffnessForm.SYMMETRIC
     )
 
 
@@ -93,7 +93,7 @@ def plot_walk_bounds(figure: Figure4) -> str:
         static = next(
             v.delay_s
             for v in figure.certified
-            if v.feedback is Feedback.STATIC_JOINT and v.form is StiffnessForm.SYMMETRIC
+            if v.signal == StaticJoint.name and v.form is StiffnessForm.SYMMETRIC
         )
         axes.plot(
             figure.time[pick], static[pick] * 1e3, "--", color="#444", lw=1.2,

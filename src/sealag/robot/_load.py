@@ -1,7 +1,6 @@
 """Reading a URDF: finding it, checking it, locking what is not actuated."""
 
 import hashlib
-import math
 import os
 import sys
 import tempfile
@@ -9,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,12 +16,12 @@ import pinocchio as pin
 
 from sealag.errors import FileError, RobotError, UnknownNameError, either, near
 from sealag.files import read_whole
+from sealag.robot._mimic import Coupling, Follower, read_followers
+from sealag.robot._urdf import LEAST_INERTIA, ROOT_JOINT, check_urdf, joint_dynamics
+from sealag.typing import Array
 
 LARGEST_URDF_BYTES = 50_000_000
-_ROOT = "root_joint"  # Pinocchio's name for the joint of a floating base
-_ENDS = ("lower", "upper")
-_INDEFINITE = 1e-6  # relative: what rounding in a URDF does to a principal inertia
-_LEAST_INERTIA = 1e-9  # kg m², kg: of what an actuated joint moves
+_ROUNDED = 0.05  # of the largest moment: what two significant digits do to a plate's
 _SINGULAR = 1e-9  # least eigenvalue of the mass matrix scaled to a unit diagonal
 
 
@@ -86,19 +85,33 @@ def resolve_urdf(text: str, *, relative_to: Path = Path()) -> Path:
     return relative_to / Path(text).expanduser()
 
 
-def read_model(path: Path, *, floating_base: bool) -> tuple[Any, dict[str, str], str]:
+class Description(NamedTuple):
+    """What a URDF says.
+
+    Attributes:
+        model: the Pinocchio model with all movable joints, mimic joints too.
+        followers: its mimic joints by name.
+        dynamics: viscous damping and Coulomb friction by joint name.
+        sha256: of the file.
+    """
+
+    model: Any
+    followers: dict[str, Follower]
+    dynamics: dict[str, tuple[float, float]]
+    sha256: str
+
+
+def read_model(path: Path, *, floating_base: bool) -> Description:
     """Read a URDF into a Pinocchio model with all its joints.
 
     Args:
         path: the URDF.
         floating_base: whether the root link is free to move.
 
-    Returns:
-        The model, for each joint that mimics another one the other's name, and the file's SHA-256.
-
     Raises:
         FileError: the file is missing, unreadable or too large.
         RobotError: it is not a URDF, or one that cannot be a robot; the message gives the reason.
+        UnknownNameError: a joint names a link or joint that does not exist.
     """
     content = read_whole(path, what="The URDF", largest=LARGEST_URDF_BYTES)
     if not content.strip():
@@ -107,7 +120,8 @@ def read_model(path: Path, *, floating_base: bool) -> tuple[Any, dict[str, str],
         root = ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
         raise RobotError(f"{path} is not well-formed XML: {error}.") from error
-    _check_description(root, path)
+    check_urdf(root, path)
+    followers = read_followers(root, path)
     for joint in root.iterfind("joint[@type='continuous']"):
         _unlimit(joint)
     text, build = ElementTree.tostring(root, encoding="unicode"), pin.buildModelFromXML
@@ -120,45 +134,28 @@ def read_model(path: Path, *, floating_base: bool) -> tuple[Any, dict[str, str],
     said = "; ".join(errors) or reason
     if model is None or said:
         raise RobotError(f"{path} cannot be read as a robot: {said.rstrip('.')}.")
-    mimics = {
-        joint.get("name", ""): mimic.get("joint", "")
-        for joint in root.iterfind("joint")
-        if (mimic := joint.find("mimic")) is not None
-    }
-    return model, mimics, hashlib.sha256(content).hexdigest()
+    _check_bodies(model, path)
+    dynamics = {j.get("name", ""): joint_dynamics(j) for j in root.iterfind("joint")}
+    return Description(model, followers, dynamics, hashlib.sha256(content).hexdigest())
 
 
-def _check_description(root: ElementTree.Element, path: Path) -> None:
-    """Refuse what the parser would accept, or refuse without saying why."""
-    if any("xacro" in element.tag for element in root.iter()):
-        raise RobotError(
-            f"{path} is a xacro file; expand it first: xacro {path.name} > robot.urdf."
-        )
-    if root.tag != "robot" or root.find("link") is None:
-        raise RobotError(f"{path} is not a URDF: it needs a <robot> with at least one <link>.")
-    if root.find("joint") is None:
-        raise RobotError(f"{path} has no joints, so there is nothing to actuate.")
-    for joint in root.iterfind("joint"):
-        name, limit, axis = joint.get("name", ""), joint.find("limit"), joint.find("axis")
-        if name in ("", _ROOT):
-            raise RobotError(f"{path}: a joint is called {name!r}; give it another name.")
-        lower, upper = (limit.get(key, "0") if limit is not None else "0" for key in _ENDS)
-        if _number(lower) > _number(upper):
+def _check_bodies(model: Any, path: Path) -> None:
+    """Refuse what moves as one if no rigid body can have its inertia (triangle inequality)."""
+    links = _links(model)
+    for number, body in enumerate(model.inertias[1:], start=1):
+        least, middle, largest = np.linalg.eigvalsh(body.inertia)
+        if largest - middle - least > _ROUNDED * max(largest, LEAST_INERTIA):
             raise RobotError(
-                f"{path}: the limits of joint {name} are {lower} … {upper}; the lower one must "
-                "come first."
+                f"{path}: link {links[number]} has, with what is fixed to it, principal moments of "
+                f"inertia {least:.3g}, {middle:.3g} and {largest:.3g} kg m²; no body's largest one "
+                "exceeds the sum of the others (triangle inequality): correct <inertia> there."
             )
-        ways = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
-        if joint.get("type") != "fixed" and not any(map(_number, ways.split())):
-            raise RobotError(f"{path}: the axis of joint {name} is zero; it needs a direction.")
 
 
-def _number(text: str) -> float:
-    """A number of the URDF; NaN if it is none, which the parser reports itself."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+def _links(model: Any) -> dict[int, str]:
+    """The first link that each joint moves, by the joint's number."""
+    bodies = (f for f in reversed(model.frames) if f.type == pin.FrameType.BODY)
+    return {frame.parentJoint: frame.name for frame in bodies}
 
 
 def _unlimit(joint: ElementTree.Element) -> None:
@@ -190,36 +187,33 @@ def _overheard() -> Iterator[list[str]]:
     errors += [line.rstrip(".") for line in said if "xml is not initialized" not in line]
 
 
-def check_inertias(model: Any, path: Path) -> None:
-    """Refuse bodies that cannot be, and joints that move almost nothing.
+def check_inertias(model: Any, coupling: Coupling, path: Path) -> None:
+    """Refuse a robot without mass, and joints that move almost nothing.
 
     Args:
-        model: the model, whose bodies are links with all that is fixed to them.
+        model: the model of all joints that move.
+        coupling: how they move with the robot's coordinates.
         path: what messages call it.
 
     Raises:
-        RobotError: the robot has no mass, a body's mass or inertia is negative, or the mass matrix
-            is singular; the message names links and joints.
+        RobotError: the robot has no mass, or the mass matrix is singular; the message names links
+            and joints.
     """
-    links = {f.parentJoint: f.name for f in reversed(model.frames) if f.type == pin.FrameType.BODY}
-    for number, body in enumerate(model.inertias[1:], start=1):
-        values = np.linalg.eigvalsh(body.inertia)
-        if body.mass < 0.0 or values[0] < -_INDEFINITE * max(values[2], _LEAST_INERTIA):
-            raise RobotError(
-                f"{path}: link {links[number]} has, with what is fixed to it, a mass of "
-                f"{body.mass:g} kg and principal inertias {', '.join(f'{v:.3g}' for v in values)} "
-                "kg m²; none can be negative."
-            )
     if not sum(body.mass for body in model.inertias[1:]) > 0.0:
         raise RobotError(f"{path} gives the robot no positive, finite mass; add <inertial> tags.")
-    M = pin.crba(model, model.createData(), pin.neutral(model))
+    q = coupling.expand(coupling.restrict(pin.neutral(model)))
+    M = coupling.T.T @ pin.crba(model, model.createData(), q) @ coupling.T
     own = np.diag(M)
     size = np.sqrt(np.maximum(own, np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(M / np.outer(size, size))
-    weak = (own < _LEAST_INERTIA) | ((values[0] < _SINGULAR) & (np.abs(vectors[:, 0]) > 0.3))
+    weak = (own < LEAST_INERTIA) | ((values[0] < _SINGULAR) & (np.abs(vectors[:, 0]) > 0.3))
     if weak.any():
+        links = _links(model)
+        velocities = coupling.restrict(np.arange(model.nv))[weak]
         moved = [
-            k for k, j in enumerate(model.joints) if k and weak[j.idx_v : j.idx_v + j.nv].any()
+            k
+            for k, j in enumerate(model.joints)
+            if k and ((velocities >= j.idx_v) & (velocities < j.idx_v + j.nv)).any()
         ]
         names = ", ".join(f"{links.get(k, '?')} (joint {model.names[k]})" for k in moved)
         raise RobotError(
@@ -229,40 +223,92 @@ def check_inertias(model: Any, path: Path) -> None:
 
 
 def reduce_model(
-    model: Any, path: Path, *, actuated: Sequence[str] | None, mimics: Mapping[str, str]
-) -> Any:
-    """Lock every movable joint that is not actuated at its neutral position.
+    model: Any, path: Path, *, actuated: Sequence[str] | None, followers: Mapping[str, Follower]
+) -> tuple[Any, dict[str, Follower]]:
+    """Lock every joint that neither is actuated nor follows one that is.
+
+    Followers are locked where their leader's neutral position puts them.
 
     Args:
         model: the whole model.
         path: what messages call it.
         actuated: names of the joints that have actuators; None for all that mimic no other one.
-        mimics: for each joint that mimics another one the other's name.
+        followers: the mimic joints of the model.
+
+    Returns:
+        The model of what moves, and the followers in it.
 
     Raises:
         UnknownNameError: an actuated joint does not exist.
         RobotError: no joint is left, or one mimics another or has more than one degree of freedom.
     """
-    movable = [name for name in model.names[1:] if name != _ROOT]
-    names = [j for j in movable if j not in mimics] if actuated is None else list(actuated)
-    for name in names:
-        if name not in movable:
-            raise near(name, movable, what=f"joint of {path.name}")
-        if name in mimics:
-            raise RobotError(
-                f"{path}: joint {name} mimics {mimics[name]} and has no actuator of its own; leave "
-                "it out of robot.actuated, it is then locked at 0."
-            )
-    if len(set(names)) < len(names):
-        raise RobotError(f"{path}: an actuated joint is listed twice.")
-    if not names:
-        raise RobotError(f"{path}: no joint is actuated.")
-    locked = [model.getJointId(name) for name in movable if name not in set(names)]
-    reduced = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
+    movable = [name for name in model.names[1:] if name != ROOT_JOINT]
+    names = _actuated(movable, path, actuated=actuated, followers=followers)
+    driven = {
+        name: follower
+        for name, follower in followers.items()
+        if follower.leader in names and follower.multiplier != 0.0
+    }
+    locked, at = [], pin.neutral(model)
+    for name in movable:
+        number = model.getJointId(name)
+        if name in followers:
+            at[model.joints[number].idx_q] = followers[name].offset
+        if name not in names and name not in driven:
+            locked.append(number)
+    reduced = _lock(model, locked, at) if locked else model
     for name in names:
         if reduced.joints[reduced.getJointId(name)].nv != 1:
             raise RobotError(
                 f"{path}: joint {name} has more than one degree of freedom; "
                 "actuated joints must be revolute, continuous or prismatic."
             )
+    return reduced, driven
+
+
+def _actuated(
+    movable: Sequence[str],
+    path: Path,
+    *,
+    actuated: Sequence[str] | None,
+    followers: Mapping[str, Follower],
+) -> list[str]:
+    """Names of the joints that have actuators, checked."""
+    names = [j for j in movable if j not in followers] if actuated is None else list(actuated)
+    for name in names:
+        if name not in movable:
+            raise near(name, movable, what=f"joint of {path.name}")
+        if name in followers:
+            raise _follows(name, followers[name], path)
+    if len(set(names)) < len(names):
+        raise RobotError(f"{path}: an actuated joint is listed twice.")
+    if not names:
+        raise RobotError(f"{path}: no joint is actuated.")
+    return names
+
+
+def _lock(model: Any, joints: Sequence[int], at: Array) -> Any:
+    """The model with joints locked where a configuration has them.
+
+    Pinocchio looks for frames by the joints' names alone, which links may share: theirs are others
+    meanwhile.
+    """
+    mark = "link of the URDF: "
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY:
+            frame.name = mark + frame.name
+    reduced = pin.buildReducedModel(model, joints, at)
+    for frame in (*model.frames, *reduced.frames):
+        if frame.type == pin.FrameType.BODY:
+            frame.name = frame.name.removeprefix(mark)
     return reduced
+
+
+def _follows(name: str, follower: Follower, path: Path) -> RobotError:
+    """Say that a mimic joint needs no actuator, and where it is without one."""
+    law = f"{follower.multiplier:g} times {follower.leader} plus {follower.offset:g}"
+    return RobotError(
+        f"{path}: joint {name} mimics {follower.leader} and has no actuator of its own; leave it "
+        f"out of robot.actuated: it follows at {law}, and is locked at {follower.offset:g} if "
+        f"{follower.leader} is not actuated."
+    )

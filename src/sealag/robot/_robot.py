@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from sealag.errors import InputError, RobotError, near
+from sealag.errors import InputError, UnknownNameError, near
 from sealag.robot._contact import Contact
-from sealag.robot._load import check_inertias, read_model, reduce_model, resolve_urdf
+from sealag.robot._mimic import Coupling, Follower, couple
 from sealag.robot._tree import Mounts, Tree, frame_mounts, tree_of
 from sealag.robot._workspace import Workspace
 from sealag.typing import Array, ArrayLike, BoolArray
-
-_UNLIMITED = 1e8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,12 +30,21 @@ class Robot:
         urdf_sha256: the file's SHA-256.
         floating_base: whether the root link moves freely.
         joints: (n) names of the actuated joints, in the order of all arrays.
-        position_lower: (n,) rad or m, -inf where there is none.
-        position_upper: (n,) rad or m, inf where there is none.
+        followers: joints that move with one of `joints` and have no coordinate, by name. All terms
+            (M, g, Jacobians, ...) are those of the coupled robot.
+        position_lower: (n,) rad or m, -inf where there is none; the followers' limits count.
+        position_upper: (n,) rad or m, inf where there is none; the followers' limits count.
         sliding: (n,) whether a joint is prismatic, with positions in m.
-        velocity_limit: (n,) rad/s or m/s, inf where there is none.
-        effort_limit: (n,) Nm or N, inf where there is none.
-        rotor_inertia: (n,) reflected rotor inertia that the URDF states, else 0, kg m².
+        velocity_limit: (n,) rad/s or m/s as the URDF says it, 0 too, inf where there is none; what
+            limits followers is not in it.
+        effort_limit: (n,) Nm or N as the URDF says it, 0 too, inf where there is none; what limits
+            followers is not in it.
+        rotor_inertia: (n,) reflected rotor inertia that the URDF states, else 0, kg m²; the
+            followers' is in it.
+        damping: (n,) viscous damping of the links' joints that the URDF states, else 0, Nms/rad or
+            Ns/m; a follower adds multiplier² times its own.
+        friction: (n,) Coulomb friction of the links' joints that the URDF states, else 0, Nm or N;
+            a follower adds |multiplier| times its own.
         mass: of everything that moves, kg; what is fixed to the world is not in it.
         tree: its bodies and joints, as compiled kernels take them.
     """
@@ -47,20 +54,26 @@ class Robot:
     urdf_sha256: str
     floating_base: bool
     joints: tuple[str, ...]
+    followers: Mapping[str, Follower]
     position_lower: Array
     position_upper: Array
     sliding: BoolArray
     velocity_limit: Array
     effort_limit: Array
     rotor_inertia: Array
+    damping: Array
+    friction: Array
     mass: float
     _model: Any = field(repr=False)
     tree: Tree = field(init=False, repr=False, compare=False)
+    _coupling: Coupling = field(init=False, repr=False, compare=False)
     _scratch: list[Workspace] = field(default_factory=list, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Take the tree from the model."""
-        object.__setattr__(self, "tree", tree_of(self._model))
+        """Take coupling and tree from the model."""
+        coupling = couple(self._model, self.followers)
+        object.__setattr__(self, "_coupling", coupling)
+        object.__setattr__(self, "tree", tree_of(self._model, coupling))
 
     @property
     def n(self) -> int:
@@ -94,7 +107,7 @@ class Robot:
 
     def workspace(self) -> Workspace:
         """Return new memory for repeated evaluation, one for each thread."""
-        return Workspace(self._model, self.tree, nv_base=self.nv_base)
+        return Workspace(self._model, self._coupling, self.tree, nv_base=self.nv_base)
 
     def workspace_at(self, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
         """Return the robot's own scratch memory, evaluated; the next call of it overwrites it.
@@ -131,8 +144,14 @@ class Robot:
             name: an actuated joint.
 
         Raises:
-            UnknownNameError: there is no such joint.
+            UnknownNameError: there is no such joint, or it follows another one.
         """
+        if name in self.followers:
+            leader = self.followers[name].leader
+            raise UnknownNameError(
+                f"Joint {name} of {self.name} follows {leader} and has no position of its own; "
+                f"give that of {leader}."
+            )
         if name not in self.joints:
             raise near(name, self.joints, what=f"actuated joint of {self.name}")
         return self.joints.index(name)
@@ -194,9 +213,9 @@ class Robot:
             q: (nq,).
             v: (nv,) velocity times time.
         """
-        return pin.integrate(
-            self._model, self._checked(q, self.nq, "configuration"), np.asarray(v, float)
-        )
+        start = self._coupling.expand(self._checked(q, self.nq, "configuration"))
+        step = self._coupling.T @ np.asarray(v, float)
+        return self._coupling.restrict(pin.integrate(self._model, start, step))
 
     def difference(self, q_from: ArrayLike, q_to: ArrayLike) -> Array:
         """Return the tangent vector (nv,) that leads from one configuration to another.
@@ -205,7 +224,8 @@ class Robot:
             q_from: (nq,).
             q_to: (nq,).
         """
-        return pin.difference(self._model, np.asarray(q_from, float), np.asarray(q_to, float))
+        ends = (self._coupling.expand(np.asarray(q, float)) for q in (q_from, q_to))
+        return self._coupling.restrict(pin.difference(self._model, *ends))
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Return M(q) (nv, nv) of Eq. (4), without rotor inertia.
@@ -233,15 +253,14 @@ class Robot:
         return self._at(q).gravity().copy()
 
     def gravity_gradient(self, q: ArrayLike) -> Array:
-        """Return ∂g/∂q (nv, nv), a derivative along tangent directions.
+        """Return ∂g/∂q (nv, nv): ∂²V/∂q², V the gravity potential, symmetric.
+
+        Among the base's own directions it is the second derivative along q ⊕ u at u = 0.
 
         Args:
             q: (nq,).
         """
-        data = self._model.createData()
-        return pin.computeGeneralizedGravityDerivatives(
-            self._model, data, self._checked(q, self.nq, "configuration")
-        ).copy()
+        return self._at(q).gravity_gradient()
 
     def center_of_mass(self, q: ArrayLike) -> Array:
         """Return the centre of mass (3,) of everything that moves, in the world, m.
@@ -261,14 +280,14 @@ class Robot:
 
     def frame_names(self) -> tuple[str, ...]:
         """Return the names of all frames: links and joints."""
-        return tuple(frame.name for frame in self._model.frames)
+        return tuple(dict.fromkeys(frame.name for frame in self._model.frames))
 
     def link_names(self) -> tuple[str, ...]:
         """Return the names of the URDF's links, which are frames too."""
         return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
 
     def check_frame(self, frame: str) -> str:
-        """Return the name of a frame if it exists.
+        """Return the name of a frame if it exists; where a link and a joint share it, the link's.
 
         Args:
             frame: the name.
@@ -288,12 +307,25 @@ class Robot:
 
         Returns:
             Numbers of the joints (F,), rotations (F, 3, 3) and positions (F, 3) in the joints'
-            axes, and 1 for every velocity that moves the frame (F, nv).
+            axes, and (F, D) for each degree of freedom of the tree, followers last, which
+            coordinate moves the frame through it: its number plus one, or 0 for none.
 
         Raises:
             UnknownNameError: a frame does not exist.
         """
-        return frame_mounts(self._model, [self.check_frame(name) for name in frames])
+        names = [self.check_frame(name) for name in frames]
+        return frame_mounts(self._model, self._coupling, names)
+
+    def carriers(self, frames: Sequence[str]) -> BoolArray:
+        """Return (n,) whether a joint, or one that follows it, moves any of the frames.
+
+        Args:
+            frames: their names.
+
+        Raises:
+            UnknownNameError: a frame does not exist.
+        """
+        return np.isin(np.arange(self.nv_base, self.nv) + 1, self.frame_mounts(frames)[3])
 
     def frame_placement(self, frame: str, q: ArrayLike) -> tuple[Array, Array]:
         """Return a frame's rotation (3, 3) and position (3,) in the world.
@@ -336,61 +368,3 @@ class Robot:
         at = self._at(q, v)
         rows = [at.frame_bias(self.check_frame(c.frame))[: c.kind.rows] for c in contacts]
         return np.concatenate(rows) if rows else np.zeros(0)
-
-
-def load_robot(
-    urdf: str | Path,
-    *,
-    floating_base: bool,
-    actuated: Sequence[str] | None = None,
-) -> Robot:
-    """Read a robot from a URDF; meshes are not needed.
-
-    Args:
-        urdf: a path, `bundled:hume.urdf`, or `example-robot-data:<path below robots>`.
-        floating_base: whether the root link moves freely.
-        actuated: names of the actuated joints; the other movable joints are locked at their
-            neutral position. None takes all that do not mimic another one.
-
-    Returns:
-        The robot; its `joints` are in the model's order, whatever the order of `actuated`.
-
-    Raises:
-        FileError: the file cannot be read.
-        RobotError: it is not a URDF of a robot with physical inertias and joints of one degree of
-            freedom, an actuated joint mimics another one, or moves almost no inertia.
-        UnknownNameError: an actuated joint or a bundled robot does not exist.
-    """
-    path = resolve_urdf(str(urdf))
-    model, mimics, digest = read_model(path, floating_base=floating_base)
-    model = reduce_model(model, path, actuated=actuated, mimics=mimics)
-    check_inertias(model, path)
-    names = tuple(name for name in model.names[1:] if name != "root_joint")
-    mass = float(sum(inertia.mass for inertia in model.inertias[1:]))
-    n = len(names)
-    lower, upper = np.array(model.lowerPositionLimit[-n:]), np.array(model.upperPositionLimit[-n:])
-    free = (np.maximum(np.abs(lower), np.abs(upper)) > _UNLIMITED) | ((lower == 0) & (upper == 0))
-    if model.nq != n + (7 if floating_base else 0):
-        raise RobotError(f"{path}: a joint's position is not one number; that is not supported.")
-    return Robot(
-        name=model.name,
-        urdf_path=path,
-        urdf_sha256=digest,
-        floating_base=floating_base,
-        joints=names,
-        position_lower=np.where(free, -np.inf, lower),
-        position_upper=np.where(free, np.inf, upper),
-        sliding=np.array([model.joints[model.getJointId(j)].shortname()[10] == "P" for j in names]),
-        velocity_limit=_limit(model.velocityLimit[-n:]),
-        effort_limit=_limit(model.effortLimit[-n:]),
-        rotor_inertia=np.array(model.armature[-n:], dtype=float),
-        mass=mass,
-        _model=model,
-    )
-
-
-def _limit(values: Array) -> Array:
-    """Limits as the URDF gives them; absent or huge ones are infinite."""
-    array = np.array(values, dtype=float)
-    array[~(np.abs(array) < _UNLIMITED)] = np.inf
-    return array

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from sealag.robot._mimic import Coupling
 from sealag.robot._tree import Mounts, Tree, frame_mounts
 from sealag.typing import Array
 
@@ -26,21 +27,23 @@ class Workspace:
         terms: what compiled kernels take, as `sealag.kernels.dynamics.allocate` returns it.
     """
 
-    def __init__(self, model: Any, tree: Tree, *, nv_base: int) -> None:
+    def __init__(self, model: Any, coupling: Coupling, tree: Tree, *, nv_base: int) -> None:
         """Allocate memory for a model.
 
         Args:
             model: the Pinocchio model of a `Robot`.
+            coupling: how its joints move with the robot's coordinates.
             tree: the same as compiled kernels take it.
             nv_base: number of base velocities, 6 or 0.
         """
         from sealag.kernels import dynamics
 
         self._model, self._tree, self._kernel = model, tree, dynamics
+        self._coupling = coupling
         self._data = model.createData()
         self._frames: dict[str, _Frame] = {}
-        self.nv, self.nv_base = int(model.nv), nv_base
-        self._q = pin.neutral(model)
+        self.nv, self.nv_base = coupling.T.shape[1], nv_base
+        self._q = coupling.restrict(pin.neutral(model))
         self.terms = dynamics.allocate(tree[0])
         self.M: Array = self.terms[0]
         self.nle: Array = self.terms[1]
@@ -73,6 +76,12 @@ class Workspace:
         """Return the gravity torque (nv,)."""
         return self._weight * self._com_jacobian[2]
 
+    def gravity_gradient(self) -> Array:
+        """Return ∂g/∂q (nv, nv) as `sealag.robot.Robot.gravity_gradient`; new memory."""
+        H = np.empty((self.nv, self.nv))
+        self._kernel.gravity_gradient(self._tree, self.terms, H)
+        return H
+
     def com_jacobian(self) -> Array:
         """Return the Jacobian (3, nv) of the centre of mass."""
         return self._com_jacobian
@@ -83,7 +92,7 @@ class Workspace:
         Args:
             q: (nq,) configuration.
         """
-        return pin.centerOfMass(self._model, self._data, q, False).copy()
+        return pin.centerOfMass(self._model, self._data, self._coupling.expand(q), False).copy()
 
     def com_bias(self) -> Array:
         """Return the acceleration (3,) of the centre of mass at zero joint acceleration."""
@@ -91,7 +100,8 @@ class Workspace:
 
     def centroidal_map(self) -> Array:
         """Return the centroidal momentum matrix (6, nv): linear then angular, world axes."""
-        return pin.computeCentroidalMap(self._model, self._data, self._q)
+        A = pin.computeCentroidalMap(self._model, self._data, self._coupling.expand(self._q))
+        return A if self._coupling.trivial else A @ self._coupling.T
 
     def frame_placement(self, frame: str) -> tuple[Array, Array]:
         """Return a frame's rotation (3, 3) and position (3,) in the world.
@@ -134,7 +144,7 @@ class Workspace:
         found = self._frames.get(name)
         if found is None:
             found = self._frames[name] = _Frame(
-                mounts=frame_mounts(self._model, [name]),
+                mounts=frame_mounts(self._model, self._coupling, [name]),
                 J=np.zeros((1, 6, self.nv)),
                 R=np.zeros((1, 3, 3)),
                 p=np.zeros((1, 3)),

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sealag.actuation import Actuators
+from sealag.actuation import Actuators, motor_parameters
 from sealag.errors import InputError
 from sealag.robot import Robot
 from sealag.simulation._contacts import MARGIN, Contacts
@@ -97,7 +97,7 @@ class Plant:
         n, nv, self._sizes = robot.n, robot.nv, self.contacts.sizes
         self.time = 0.0
         self._terms = dynamics.allocate(robot.tree[0])
-        self._parameters = joint_parameters(robot, actuators)
+        self._parameters = motor_parameters(actuators, robot.damping)
         self._instant = 0.0 if delayed_torque_feedback else 1.0
         self._tables = (
             np.empty((n, 4, 9, 9)),
@@ -390,29 +390,6 @@ class Plant:
             )
 
 
-def joint_parameters(robot: Robot, actuators: Actuators) -> Array:
-    """Return the motor kernels' parameters (n, 11) of a robot's joints."""
-    columns = [
-        actuators.spring_stiffness,
-        actuators.spring_damping,
-        actuators.rotor_inertia,
-        actuators.rotor_inertia / actuators.shaped_inertia,
-        actuators.motor_damping,
-        actuators.viscous_friction,
-        actuators.coulomb_friction,
-        actuators.torque_limit,
-        actuators.velocity_limit,
-        actuators.torque_bandwidth,
-        _joint_damping(robot),
-    ]
-    return np.ascontiguousarray(np.stack(columns, axis=1), dtype=float)
-
-
-def _joint_damping(robot: Robot) -> Array:
-    """Viscous damping of the joints on the links' side (n,), Nms/rad."""
-    return getattr(robot, "damping", np.zeros(robot.n))
-
-
 def fastest_link(robot: Robot, actuators: Actuators, q: Array) -> tuple[float, str]:
     """Return how fast the fastest link follows its spring and dampers, and its joint.
 
@@ -426,7 +403,7 @@ def fastest_link(robot: Robot, actuators: Actuators, q: Array) -> tuple[float, s
     """
     n = robot.n
     mobility = np.linalg.inv(robot.mass_matrix(q))[-n:, -n:]
-    damping = actuators.spring_damping + _joint_damping(robot)
+    damping = actuators.spring_damping + robot.damping
     root = np.sqrt(actuators.spring_stiffness)
     O = np.zeros((n, n))
     # State (√K δ, v): without damping the matrix is as well scaled as its eigenvalues.

@@ -1,29 +1,36 @@
-"""The whole-body controller: tasks, contact-consistent matrices, and what it feeds back."""
+"""The whole-body law: tasks, signals, the controller that runs it, and its frozen loop."""
 
 from sealag.whole_body._controller import Controller
-from sealag.whole_body._linearise import Linearisation, linearise
-from sealag.whole_body._options import ControllerOptions, TaskError
+from sealag.whole_body._frozen import FrozenLoop, freeze, sea_loop
+from sealag.whole_body._law import Law
+from sealag.whole_body._links import FreeLinks, LinkPlant
 from sealag.whole_body._protocol import (
     Measurement,
     StoringController,
     TankController,
     TickController,
 )
-from sealag.whole_body._stack import (
-    RANK_TOLERANCE,
-    WholeBodyStack,
-    evaluate,
-    passive_stiffness,
-    relative_asymmetry,
+from sealag.whole_body._rest import Rest, posture_of, rest_of
+from sealag.whole_body._signals import (
+    SIGNAL_NAMES,
+    LawDerivative,
+    LinkAngles,
+    MotorAngles,
+    Refusal,
+    Signal,
+    StaticJoint,
+    Tank,
+    signal_named,
 )
+from sealag.whole_body._spaces import Spaces, relative_asymmetry, spaces_along
 from sealag.whole_body._static_joint import StaticJointState, static_joint_state
 from sealag.whole_body._tank import TankFlow
 from sealag.whole_body._tasks import (
-    Feedback,
+    RANK_TOLERANCE,
     GravityCompensation,
-    Hierarchy,
     StiffnessForm,
     Task,
+    TaskError,
     TaskInertia,
     TaskKind,
     stiffness_matrix,
@@ -31,16 +38,26 @@ from sealag.whole_body._tasks import (
 
 __all__ = [
     "RANK_TOLERANCE",
+    "SIGNAL_NAMES",
     "Controller",
-    "ControllerOptions",
-    "Feedback",
+    "FreeLinks",
+    "FrozenLoop",
     "GravityCompensation",
-    "Hierarchy",
-    "Linearisation",
+    "Law",
+    "LawDerivative",
+    "LinkAngles",
+    "LinkPlant",
     "Measurement",
+    "MotorAngles",
+    "Refusal",
+    "Rest",
+    "Signal",
+    "Spaces",
+    "StaticJoint",
     "StaticJointState",
     "StiffnessForm",
     "StoringController",
+    "Tank",
     "TankController",
     "TankFlow",
     "Task",
@@ -48,11 +65,13 @@ __all__ = [
     "TaskInertia",
     "TaskKind",
     "TickController",
-    "WholeBodyStack",
-    "evaluate",
-    "linearise",
-    "passive_stiffness",
+    "freeze",
+    "posture_of",
     "relative_asymmetry",
+    "rest_of",
+    "sea_loop",
+    "signal_named",
+    "spaces_along",
     "static_joint_state",
     "stiffness_matrix",
 ]

@@ -47,14 +47,19 @@ class EnergyTank:
             delay_bound: d̄, s.
             flow: what the tank pays for.
         """
-        self._first, self._rate = energy, rate
+        self._first, self.rate = energy, rate
         self._delay_bound, self._flow = delay_bound, flow
         self.position = np.zeros(size)
         self.energy = energy
         self.started = False
 
-    def empty_memory(self) -> None:
-        """Fill the tank anew and forget x̂."""
+    @property
+    def can_pay(self) -> bool:
+        """Whether a full tank moves x̂ at all."""
+        return self._first > 0.0 and self.rate > 0.0
+
+    def reset(self) -> None:
+        """Fill the tank and forget x̂."""
         self.energy, self.started = self._first, False
 
     def start(self, position: Array) -> None:
@@ -80,7 +85,7 @@ class EnergyTank:
         """
         if period > 0.0:
             # u of the exact solution of x̂̇ = rate (target − x̂), so that no period is too long.
-            pull = -np.expm1(-self._rate * period) / period
+            pull = -np.expm1(-self.rate * period) / period
             u = pull * (target - self.position - moved)
             force = stiffness @ u
             flow = -self._delay_bound * float(force @ (0.5 * period * u + moved))

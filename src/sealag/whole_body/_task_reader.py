@@ -7,20 +7,21 @@ import numpy as np
 from sealag.errors import InputError
 from sealag.robot import Contact, Robot
 from sealag.typing import Array, ArrayLike, IntArray
-from sealag.whole_body._tasks import Hierarchy, TaskKind
+from sealag.whole_body._law import Law
+from sealag.whole_body._tasks import TaskKind
 
 TaskArrays: TypeAlias = tuple[IntArray, IntArray, IntArray, Array, Array, Array]
 """As ``tasks`` of `sealag.kernels.control_law.law`."""
 
 
 def read_tasks(
-    robot: Robot, hierarchy: Hierarchy, contacts: tuple[Contact, ...], *, posture: ArrayLike
+    robot: Robot, law: Law, contacts: tuple[Contact, ...], *, posture: ArrayLike
 ) -> tuple[list[str], TaskArrays]:
     """Measure what each task shall reach, so that all errors are 0 in a posture.
 
     Args:
         robot: the robot.
-        hierarchy: its tasks.
+        law: the law, with its tasks.
         contacts: which frames are held.
         posture: (nq,) configuration.
 
@@ -40,7 +41,7 @@ def read_tasks(
     held = [(f, row) for f, contact in enumerate(contacts) for row in range(contact.kind.rows)]
     rows: list[tuple[int, int, int]] = []
     values: list[float] = []
-    for task, chosen in zip(hierarchy.ordered, hierarchy.rows(robot), strict=True):
+    for task, chosen in zip(law.ordered, law.rows(robot), strict=True):
         kind, frame, whole = OF_JOINT, 0, robot.joint_positions(q)
         if chosen.frame is not None:
             kind, frame, whole = OF_FRAME, len(names), np.zeros(6)
@@ -53,7 +54,7 @@ def read_tasks(
     return names, (
         np.array(held, dtype=np.int64).reshape(-1, 2),
         np.array(rows, dtype=np.int64).reshape(-1, 3),
-        np.array(hierarchy.levels(robot)),
+        np.array(law.levels(robot)),
         np.array([rotation for rotation, _ in placed]).reshape(-1, 3, 3),
         np.array([position for _, position in placed]).reshape(-1, 3),
         np.array(values),

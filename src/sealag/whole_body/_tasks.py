@@ -1,9 +1,8 @@
-"""Operational-space tasks and their order of priority."""
+"""Operational-space tasks, and the words for how a law uses them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
-from itertools import groupby
 
 import numpy as np
 
@@ -39,19 +38,6 @@ class StiffnessForm(StrEnum):
         return self if self is StiffnessForm.FORCE else StiffnessForm.PUBLISHED
 
 
-class Feedback(StrEnum):
-    """The signal that the controller feeds back.
-
-    motor: x(θ); static_joint: x(q̄(θ)) of Eqs. (15)-(17); static_joint_tank: the energy tank's x̂
-    with a flow that pays for all that u does; joint: x(q) of link-side angles.
-    """
-
-    MOTOR = "motor"
-    STATIC_JOINT = "static_joint"
-    STATIC_JOINT_TANK = "static_joint_tank"
-    JOINT = "joint"
-
-
 class GravityCompensation(StrEnum):
     """Where gravity compensation takes its configuration from.
 
@@ -73,6 +59,29 @@ class TaskInertia(StrEnum):
     LAMBDA_TS = "lambda_ts"
     LAMBDA_STAR = "lambda_star"
 
+
+class TaskError(StrEnum):
+    """Which error a task below the first level feeds back.
+
+    consistent: x̃_{k|prec} = x̃_k − J_k Σ_{i<k} P_i J_iᵀ Λ_i x̃_{i|prec}, what is left of x̃_k once
+    the tasks above have removed theirs. Its rate is −J*_{k|prec} θ̇, as Corollary 1 takes it, so
+    that −∂τ_osc/∂θ = Σ J*ᵀ S J* is symmetric with S.
+
+    plain: x̃_k = x_d,k − x_k as printed. Its rate is −J_k overline(UN_s) θ̇: the stiffness
+    Σ J*_{k|prec}ᵀ S_k J_k overline(UN_s) is not symmetric and has no potential. With one level the
+    two are the same.
+    """
+
+    CONSISTENT = "consistent"
+    PLAIN = "plain"
+
+
+RANK_TOLERANCE = 1e-9
+"""A direction counts as lost where contacts, higher tasks or a singular leg leave less than this
+fraction of the mobility that it would have without them."""
+
+FORM_CODE = {"symmetric": 0, "published": 1, "force": 2}
+"""The stiffness forms as compiled kernels take them."""
 
 _SIZE = {TaskKind.COM: 3, TaskKind.POSITION: 3, TaskKind.ORIENTATION: 3, TaskKind.POSE: 6}
 _NEEDS_FRAME = {TaskKind.POSITION, TaskKind.ORIENTATION, TaskKind.POSE}
@@ -195,64 +204,6 @@ def stiffness_matrix(values: ArrayLike, size: int, *, what: str) -> Array:
     if np.linalg.eigvalsh(array)[0] < -1e-12 * np.abs(array).max():
         raise InputError(f"{what} is not positive semidefinite.")
     return array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hierarchy:
-    """Tasks in order of priority, and how their gains become stiffness.
-
-    Attributes:
-        tasks: the tasks; those of equal priority share a level, in the order given.
-        form: how the stiffness follows from gain and inertia.
-        task_inertia: which inertia that is.
-    """
-
-    tasks: tuple[Task, ...]
-    form: StiffnessForm = StiffnessForm.SYMMETRIC
-    task_inertia: TaskInertia = TaskInertia.LAMBDA_TS
-    ordered: tuple[Task, ...] = field(init=False, repr=False)
-    """The tasks by priority."""
-
-    def __post_init__(self) -> None:
-        """Sort the tasks.
-
-        Raises:
-            InputError: there is none, or two have one name.
-        """
-        if not self.tasks:
-            raise InputError("The hierarchy has no tasks; at least one is needed.")
-        names = [task.name for task in self.tasks]
-        if len(set(names)) < len(names):
-            raise InputError("Two tasks of the hierarchy have the same name.")
-        ordered = tuple(sorted(self.tasks, key=lambda task: task.priority))
-        object.__setattr__(self, "ordered", ordered)
-
-    def rows(self, robot: Robot) -> list[TermRows]:
-        """Return the Jacobian rows of all tasks, by priority.
-
-        Args:
-            robot: the robot.
-        """
-        return [task.rows(robot) for task in self.ordered]
-
-    def levels(self, robot: Robot) -> list[int]:
-        """Return the first row of each level, then the number of rows.
-
-        Args:
-            robot: the robot.
-        """
-        ends = [0]
-        for _, tasks in groupby(self.ordered, key=lambda task: task.priority):
-            ends.append(ends[-1] + sum(len(task.rows(robot).rows) for task in tasks))
-        return ends
-
-    def gain(self, robot: Robot) -> Array:
-        """Return K_x of all tasks, (m, m), blocks by priority on the diagonal.
-
-        Args:
-            robot: the robot.
-        """
-        return block_diagonal([t.gain(len(t.rows(robot).rows)) for t in self.ordered])
 
 
 def block_diagonal(blocks: Sequence[Array]) -> Array:

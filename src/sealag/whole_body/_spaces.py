@@ -10,20 +10,29 @@ import numpy as np
 from sealag.actuation import Actuators
 from sealag.errors import RobotError
 from sealag.robot import Contact, Motion, Robot, Stack, stack_terms
-from sealag.typing import Array
-from sealag.whole_body._options import TaskError
-from sealag.whole_body._tasks import Feedback, GravityCompensation, Hierarchy, TaskInertia
+from sealag.typing import Array, BoolArray
+from sealag.whole_body._law import Law
+from sealag.whole_body._signals import static_contraction
+from sealag.whole_body._tasks import (
+    FORM_CODE,
+    RANK_TOLERANCE,
+    GravityCompensation,
+    TaskError,
+    TaskInertia,
+)
 
-RANK_TOLERANCE = 1e-9
-"""A direction counts as lost where contacts, higher tasks or a singular leg leave less than this
-fraction of the mobility that it would have without them."""
+_STEP = 1e-5  # rad: half the base of central differences of gravity compensation
+_BESIDE = 1e-3
+"""rad: how far beside an instant its ranks are compared. Ten times larger meets other postures;
+ten times smaller meets the width over which the rank tolerance drops a direction, 3e-5 rad."""
 
-FORM_CODE = {"symmetric": 0, "published": 1, "force": 2}
-_STEP = 1e-5
+_EMPTY = 1e-13
+"""Share of Λ's largest eigenvalue below which one belongs to a dropped direction: kept ones lie
+above RANK_TOLERANCE, dropped ones are rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WholeBodyStack:
+class Spaces:
     """The whole-body controller's matrices at N instants.
 
     Attributes:
@@ -36,10 +45,12 @@ class WholeBodyStack:
             errors Σ J*_{k|prec}ᵀ S_k J_k overline(UN_s).
         F_gravity: (N, n, n) ∂ḡ/∂q_j along contact-consistent motions; 0 unless it is fed back.
         F_q: (N, n, n) F_task − F_gravity.
-        F_theta: (N, n, n) −∂τ_osc/∂θ for the signal that is fed back.
+        F_theta: (N, n, n) −∂τ_osc/∂θ of the signal, with J* and S frozen.
         contraction: (N,) ‖K^{-½} F_q K^{-½}‖, the contraction factor of q̄(θ).
         asymmetry: (N,) ‖F_θ − F_θᵀ‖ / ‖F_θ + F_θᵀ‖.
         gravity: (N, n) compensation torque ḡ, Nm.
+        singular: (N,) whether contacts or tasks lose a direction there that they have beside it, so
+            that F jumps.
     """
 
     levels: tuple[int, ...]
@@ -54,6 +65,7 @@ class WholeBodyStack:
     contraction: Array
     asymmetry: Array
     gravity: Array
+    singular: BoolArray
 
     def __len__(self) -> int:
         """Return the number of instants."""
@@ -69,30 +81,14 @@ class WholeBodyStack:
         return self.J_star[:, rows], self.Lambda[:, rows, rows], self.K_x[rows, rows]
 
 
-def evaluate(
-    robot: Robot,
-    hierarchy: Hierarchy,
-    actuators: Actuators,
-    *,
-    motion: Motion,
-    feedback: Feedback = Feedback.STATIC_JOINT,
-    gravity: GravityCompensation = GravityCompensation.FEEDBACK,
-    task_error: TaskError = TaskError.CONSISTENT,
-) -> WholeBodyStack:
-    """Evaluate the whole-body controller's matrices at every instant of a motion.
-
-    The motor-side stiffness is F_θ = F_q for feedback of motor angles and for the tank,
-    F_q (I − K⁻¹F_q)⁻¹ for q̄(θ), and F_q, acting on link angles, for link feedback. Where
-    q̄(θ) has no contraction (factor 1 or more) F_θ has no meaning and is NaN.
+def spaces_along(robot: Robot, law: Law, actuators: Actuators, motion: Motion) -> Spaces:
+    """Evaluate the law's matrices at every instant of a motion.
 
     Args:
         robot: the robot.
-        hierarchy: its tasks.
+        law: the law.
         actuators: its springs.
         motion: configurations and contacts.
-        feedback: the signal that is fed back.
-        gravity: where gravity compensation takes its configuration from.
-        task_error: which error tasks below the first level feed back.
 
     Returns:
         Stacked matrices in the motion's order.
@@ -102,32 +98,33 @@ def evaluate(
         UnknownNameError: a frame or joint of a task or contact does not exist.
     """
     n, count = robot.n, len(motion)
-    levels = hierarchy.levels(robot)
+    levels = law.levels(robot)
     m = levels[-1]
     J_star, Lambda, S = (np.zeros((count, m, k)) for k in (n, m, m))
     torque, F_gravity = np.zeros((count, n)), np.zeros((count, n, n))
-    moved = J_star if task_error is TaskError.CONSISTENT else np.zeros_like(J_star)
+    singular = np.zeros(count, dtype=bool)
+    moved = J_star if law.task_error is TaskError.CONSISTENT else np.zeros_like(J_star)
     for index, contacts in enumerate(motion.contact_sets):
         where = np.flatnonzero(motion.contact_index == index)
         if len(where) == 0:
             continue
         q = motion.q[where]
-        at = _operational_spaces(robot, hierarchy, q, contacts=contacts)
+        at = _spaces_at(robot, law, q, contacts=contacts)
         J_star[where], Lambda[where], S[where], torque[where] = (
             at.J_star, at.Lambda, at.stiffness, at.gravity,
         )  # fmt: skip
-        if task_error is TaskError.PLAIN:
+        singular[where] = _singular(robot, law, q, at, contacts=contacts, levels=levels)
+        if law.task_error is TaskError.PLAIN:
             moved[where] = at.J_t @ at.along
-        if gravity is GravityCompensation.FEEDBACK:
+        if law.gravity is GravityCompensation.FEEDBACK:
             F_gravity[where] = _gravity_gradient(robot, q, contacts, directions=at.along)
+    K = actuators.spring_stiffness
     F_task = J_star.transpose(0, 2, 1) @ S @ moved
     F_q = F_task - F_gravity
-    root = np.sqrt(actuators.spring_stiffness)
-    contraction = np.linalg.norm(F_q / root[:, None] / root[None, :], ord=2, axis=(1, 2))
-    F_theta = _motor_side(F_q, actuators.spring_stiffness, contraction, feedback=feedback)
-    return WholeBodyStack(
+    F_theta = law.signal.motor_stiffness(F_q, K)
+    return Spaces(
         levels=tuple(levels),
-        K_x=hierarchy.gain(robot),
+        K_x=law.gain(robot),
         J_star=J_star,
         Lambda=Lambda,
         stiffness=S,
@@ -135,9 +132,10 @@ def evaluate(
         F_gravity=F_gravity,
         F_q=F_q,
         F_theta=F_theta,
-        contraction=contraction,
+        contraction=static_contraction(F_q, K),
         asymmetry=relative_asymmetry(F_theta),
         gravity=torque,
+        singular=singular,
     )
 
 
@@ -152,18 +150,7 @@ def relative_asymmetry(F: Array) -> Array:
     return np.divide(skew, even, out=np.where(skew == 0.0, 0.0, np.inf), where=even > 0.0)
 
 
-def _motor_side(F_q: Array, K: Array, contraction: Array, *, feedback: Feedback) -> Array:
-    """F_θ = F_q (I − K⁻¹F_q)⁻¹ where q̄(θ) is fed back, else F_q."""
-    if feedback is not Feedback.STATIC_JOINT:
-        return F_q
-    F_theta = np.full_like(F_q, np.nan)
-    good = contraction < 1.0
-    loop = np.eye(len(K)) - F_q[good] / K[:, None]
-    F_theta[good] = np.linalg.solve(loop.transpose(0, 2, 1), F_q[good].transpose(0, 2, 1))
-    return F_theta.transpose(0, 2, 1)
-
-
-class _Spaces(NamedTuple):
+class _SpacesAt(NamedTuple):
     """Operational spaces at N configurations with the same contacts."""
 
     J_star: Array  # (N, m, n)
@@ -175,23 +162,21 @@ class _Spaces(NamedTuple):
     J_t: Array  # (N, m, nv)
 
 
-def _operational_spaces(
-    robot: Robot, hierarchy: Hierarchy, q: Array, *, contacts: Sequence[Contact]
-) -> _Spaces:
-    stack = stack_terms(robot, q, contacts, rows=hierarchy.rows(robot))
+def _spaces_at(robot: Robot, law: Law, q: Array, *, contacts: Sequence[Contact]) -> _SpacesAt:
+    stack = stack_terms(robot, q, contacts, rows=law.rows(robot))
     return _solved(
         robot,
         stack,
-        gain=hierarchy.gain(robot),
-        levels=hierarchy.levels(robot),
-        form=FORM_CODE[hierarchy.form],
-        star=hierarchy.task_inertia is TaskInertia.LAMBDA_STAR,
+        gain=law.gain(robot),
+        levels=law.levels(robot),
+        form=FORM_CODE[law.stiffness_form],
+        star=law.task_inertia is TaskInertia.LAMBDA_STAR,
     )
 
 
 def _solved(
     robot: Robot, stack: Stack, *, gain: Array, levels: list[int], form: int, star: bool
-) -> _Spaces:
+) -> _SpacesAt:
     from sealag.kernels.operational_space import allocate, operational_spaces
 
     count, c, nv = stack.J_s.shape
@@ -216,65 +201,42 @@ def _solved(
             f"The mass matrix of {robot.name} is not positive definite; "
             "a link that moves has no mass or no inertia."
         )
-    return _Spaces._make([*out, stack.J_t])
+    return _SpacesAt._make([*out, stack.J_t])
 
 
-def passive_stiffness(
+def _singular(
     robot: Robot,
-    hierarchy: Hierarchy,
-    actuators: Actuators,
-    *,
+    law: Law,
     q: Array,
+    at: _SpacesAt,
+    *,
     contacts: Sequence[Contact],
-    feedback: Feedback,
-    gravity: GravityCompensation,
-    task_error: TaskError = TaskError.CONSISTENT,
-) -> Array:
-    """Return −∂τ_osc/∂q at fixed motor (or link) angles along what contacts leave free, (n, nv).
+    levels: list[int],
+) -> BoolArray:
+    """Whether configurations (N, nq) have fewer directions than those a little beside them.
 
-    Where contacts and joints do not determine each other, as on a point foot, x depends on
-    passive motions of the base besides θ: δx = J* δθ + E (I − overline(UN_s) U) δq with the task
-    errors' Jacobian E. F_θ says nothing of them; the exact margin must. 0 where joints determine
-    all motions, and for the tank, whose x̂ moves with J* θ̇ alone.
-
-    Args:
-        robot: the robot.
-        hierarchy: its tasks.
-        actuators: its springs.
-        q: (nq,) configuration.
-        contacts: which frames are held.
-        feedback: the signal that is fed back.
-        gravity: where gravity compensation takes its configuration from.
-        task_error: which error tasks below the first level feed back.
-
-    Raises:
-        RobotError: the mass matrix is not positive definite.
+    Beside means along contact-consistent motions in two general directions: of a family of
+    postures almost all have the full rank, so that any of them shows what is lost.
     """
-    n, nv = robot.n, robot.nv
-    if feedback is Feedback.STATIC_JOINT_TANK:
-        return np.zeros((n, nv))
-    at = _operational_spaces(robot, hierarchy, q[None], contacts=contacts)
-    free = np.eye(nv)
-    if len(J_s := robot.contact_jacobian(contacts, q)):
-        free -= np.linalg.pinv(J_s, rcond=RANK_TOLERANCE) @ J_s
-    passive = free - at.along[0] @ free[nv - n :]
-    J, S, E = at.J_star[0], at.stiffness[0], at.J_t[0].copy()
-    levels = hierarchy.levels(robot)
-    if task_error is TaskError.CONSISTENT:
-        for first, last in itertools.pairwise(levels[1:]):
-            E[first:last] -= at.J_t[0, first:last] @ at.lift[0, :first].T @ E[:first]
-    F = J.T @ S @ E @ passive
-    if gravity is GravityCompensation.FEEDBACK:
-        basis, sizes, _ = np.linalg.svd(passive)
-        basis = basis[:, sizes > 1e-9]
-        slope = _gravity_gradient(robot, q[None], contacts, directions=basis[None])[0]
-        F -= slope @ basis.T @ passive
-    if feedback is Feedback.STATIC_JOINT:
-        stack = J.T @ S @ E @ at.along[0]
-        if gravity is GravityCompensation.FEEDBACK:
-            stack -= _gravity_gradient(robot, q[None], contacts, directions=at.along)[0]
-        F = np.linalg.solve(np.eye(n) - stack / actuators.spring_stiffness, F)
-    return F
+    lost = np.zeros(len(q), dtype=bool)
+    here = _ranks(robot, at, levels)
+    for seed in (1, 2):
+        way = np.random.default_rng(seed).normal(size=robot.n)
+        steps = at.along @ (_BESIDE * way / np.linalg.norm(way))
+        aside = np.stack([robot.integrate(a, b) for a, b in zip(q, steps)])
+        there = _spaces_at(robot, law, aside, contacts=contacts)
+        lost |= (here < _ranks(robot, there, levels)).any(axis=1)
+    return lost
+
+
+def _ranks(robot: Robot, at: _SpacesAt, levels: list[int]) -> Array:
+    """Directions that joints have, and that each level has, (N, 1 + levels)."""
+    joints = np.trace(at.along[:, robot.nv_base :], axis1=1, axis2=2)
+    columns = [np.round(joints)]
+    for first, last in itertools.pairwise(levels):
+        values = np.linalg.eigvalsh(at.Lambda[:, first:last, first:last])
+        columns.append((values > _EMPTY * values[:, -1:]).sum(axis=1))
+    return np.stack(columns, axis=1)
 
 
 def _gravity_gradient(

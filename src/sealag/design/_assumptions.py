@@ -1,0 +1,179 @@
+"""What a certificate takes for granted: one list, each with a key that stays the same."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sealag.delay import share_left_out
+from sealag.design._local import Local
+from sealag.design._system import System
+from sealag.passivity import Assumption, Basis, Criterion
+from sealag.robot import Motion
+from sealag.units import time_text
+from sealag.whole_body import GravityCompensation, Tank, TaskError
+
+
+def assumptions_of(
+    system: System, motion: Motion, criterion: Criterion, local: Local
+) -> tuple[Assumption, ...]:
+    """Return what a certificate of a design takes for granted.
+
+    Whatever a design states that changes a run, but neither the bound nor the margin, stands here
+    by the name of its key.
+
+    Args:
+        system: the design.
+        motion: what was certified.
+        criterion: the criterion that was used.
+        local: what is known of stability.
+    """
+    parts = (_of_the_proof(system, motion, criterion), _of_stability(motion, local))
+    parts += (_of_delays(system), _of_the_law(system), _of_drives(system), _of_contacts(system))
+    return tuple(Assumption(key=key, text=text) for part in parts for key, text in part)
+
+
+def _of_the_proof(
+    system: System, motion: Motion, criterion: Criterion
+) -> Iterator[tuple[str, str]]:
+    yield (
+        "frozen_coefficients",
+        "J* and S are frozen at each instant, so that the multiplier may differ from instant to "
+        "instant; common_multiplier_delay_s is the bound with a single one.",
+    )
+    if len(motion) > 1:
+        yield (
+            "instants",
+            "The motion's instants are checked, not what lies between them; each is taken as a "
+            "configuration that is held.",
+        )
+    if criterion is Criterion.PUBLISHED:
+        yield (
+            "published_criterion",
+            "The criterion is (29)/(31) as printed: it takes Λ K_x for symmetric, x(θ) for what is "
+            "fed back and gravity for not delayed, and can certify what is unstable.",
+        )
+
+
+def _of_stability(motion: Motion, local: Local) -> Iterator[tuple[str, str]]:
+    yield (
+        "passivity_is_not_stability",
+        "Passivity does not imply stability; see stable and local_margin_s, which are of the law "
+        "that runs, linearised where it rests, at constant delay.",
+    )
+    if len(motion) > 1:
+        yield (
+            "instants_decided",
+            f"Stability was decided exactly at {local.count(Basis.EXACT)} of {len(motion)} "
+            f"instants, by the passive bound at {local.count(Basis.BOUND)}, by a search for "
+            f"earlier crossings at {local.count(Basis.SEARCHED)}, and not at "
+            f"{local.count(Basis.OPEN)}.",
+        )
+    if local.problem:
+        yield "critical_instant", f"At the critical instant {local.problem}."
+
+
+def _of_delays(system: System) -> Iterator[tuple[str, str]]:
+    delays = system.delays
+    yield (
+        "delay_bound",
+        f"d_1 is at most {time_text(delays.d_1)}; it may vary below that (order, phase, frequency "
+        "and table of the delays act in simulation only).",
+    )
+    ways = {
+        "central_up": delays.central.up,
+        "central_down": delays.central.down,
+        "embedded_down": delays.embedded.down,
+    }
+    for name, link in ways.items():
+        if share := share_left_out(link.delay):
+            yield (
+                "delay_quantile",
+                f"{share:.1%} of the packets on the way {name} are later than the bound: the "
+                "quantile of the samples leaves them out. For these nothing is certified.",
+            )
+    yield (
+        "one_delay",
+        "The ways up and down count by their sum d_1; d_2 delays the feedforward and moves no "
+        "root.",
+    )
+    if not delays.delayed_torque_feedback:
+        yield (
+            "torque_feedback",
+            "Motor damping and torque feedback act in the drives without delay; the way "
+            "embedded_up carries nothing that is fed back.",
+        )
+
+
+def _of_the_law(system: System) -> Iterator[tuple[str, str]]:
+    law = system.law
+    if law.gravity is GravityCompensation.PLANNED:
+        yield (
+            "planned_gravity",
+            "Gravity compensation comes from the plan and has no feedback gradient.",
+        )
+    if isinstance(law.signal, Tank):
+        yield (
+            "tank",
+            f"The energy tank pays for all that u does, with {law.signal.energy:g} J at the start; "
+            "u = 0 while it is empty. Stability is that of a tank that can pay.",
+        )
+    if len(law.levels(system.robot)) > 2:
+        yield (
+            "lower_tasks",
+            "A lower task's error is what the tasks above leave of it."
+            if law.task_error is TaskError.CONSISTENT
+            else "Lower tasks feed back their whole errors, as printed.",
+        )
+    if system.robot.floating_base:
+        yield (
+            "base_motion",
+            "For the passive bound, motions of the base that the motors do not determine stand "
+            "still; the local margin contains them.",
+        )
+    if system.walking is not None:
+        yield (
+            "walking",
+            "The law of [walking] (feet, steps, friction, terrain, gait, options) is another one; "
+            "nothing is said of it.",
+        )
+
+
+def _of_drives(system: System) -> Iterator[tuple[str, str]]:
+    drives, robot = system.actuators, system.robot
+    limited = np.isfinite(drives.torque_limit)
+    if limited.any():
+        yield (
+            "torque_limit",
+            "The motors' torque limits (torque_limit, or the URDF's effort) carry the posture and "
+            "are not reached in motion.",
+        )
+    if np.isfinite(drives.velocity_limit).any():
+        yield (
+            "velocity_limit",
+            "The motors' speed limits (velocity_limit, or the URDF's velocity) are not reached.",
+        )
+    if drives.coulomb_friction.any():
+        yield (
+            "coulomb_friction",
+            "Coulomb friction (coulomb_friction, or the URDF's friction, taken at the motor) only "
+            "dissipates; it leaves a static error, and the local margin is that of sliding motors.",
+        )
+    if (robot.effort_limit == 0.0).any() or (robot.velocity_limit == 0.0).any():
+        zero = (robot.effort_limit == 0.0) | (robot.velocity_limit == 0.0)
+        names = ", ".join(np.array(robot.joints)[zero].tolist())
+        yield "urdf_limit_zero", f"The URDF gives an effort or velocity limit of 0 for {names}."
+
+
+def _of_contacts(system: System) -> Iterator[tuple[str, str]]:
+    if system.contacts:
+        yield (
+            "contacts",
+            "Contacts neither slip nor lift off (friction, foot_radius, foot_half_length, "
+            "foot_half_width, torsional_damping and torsional_radius act in simulation only).",
+        )
+    yield (
+        "simulation",
+        "What [simulation] says (scenario, duration_s, physics_step_ms, pushes with frame, "
+        "force_n, start_s and duration_s, drop_height, track_amplitude, track_frequency_hz, seed, "
+        "and the ground and feet) sets a run, not the loop.",
+    )

@@ -1,0 +1,281 @@
+"""Stability and delay margin of the law that runs, decided over all instants of a motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.design._criteria import ASYMMETRY_TOLERANCE, Bounds
+from sealag.design._system import System
+from sealag.errors import ContractionError, SolverError
+from sealag.margin import DelayMargin, delay_margin
+from sealag.passivity import Basis
+from sealag.robot import Motion
+from sealag.typing import Array
+from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, Spaces, sea_loop
+
+MOST_EXACT = 600
+"""Instants of a motion that are decided exactly at most; a bound decides the others, or none."""
+
+_FEW = 50  # instants up to which all are decided, also once one is known to be unstable
+_AT_REST = 1e-7  # share of weight and torques that springs and contacts may leave over at a posture
+_MINIMUM = 1e-9  # share of the largest curvature above which a potential has a strict minimum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InstantMargin:
+    """What is known of one instant.
+
+    Attributes:
+        basis: how it is known.
+        delay: margin or its lower bound, s; NaN if open.
+        unstable_roots: roots not in the open left half-plane without delay; 0 if open.
+    """
+
+    basis: Basis
+    delay: float
+    unstable_roots: int = 0
+
+
+OPEN = InstantMargin(basis=Basis.OPEN, delay=float("nan"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Local:
+    """Stability over a motion.
+
+    Attributes:
+        instants: what is known of each instant.
+        critical: the instant with the smallest margin; of those unstable without delay the one with
+            most unstable roots.
+        margin: its exact margin; None if none could be decided.
+        loop: its frozen loop; None where the law has none.
+        rest: where it rests; None if it was not looked for.
+        problem: why the critical instant has no margin, in words; empty if it has.
+    """
+
+    instants: tuple[InstantMargin, ...]
+    critical: int
+    margin: DelayMargin | None
+    loop: FrozenLoop | None
+    rest: Rest | None
+    problem: str
+
+    @property
+    def unstable_modes(self) -> int:
+        """Most unstable roots without delay over the instants that were decided."""
+        return max(one.unstable_roots for one in self.instants)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the loop is stable without delay at every instant; None if that is not known."""
+        if self.unstable_modes or any(one.delay == 0.0 for one in self.instants):
+            return False
+        return None if any(one.basis is Basis.OPEN for one in self.instants) else True
+
+    @property
+    def margin_s(self) -> float | None:
+        """Smallest margin of the instants that were decided exactly, s; None if there is none."""
+        exact = [one.delay for one in self.instants if one.basis is Basis.EXACT]
+        return min(exact, default=None)
+
+    @property
+    def first_crossing_s(self) -> float | None:
+        """Delay at which roots cross first at the critical instant, s; None if not known."""
+        if self.margin is None or np.isnan(self.margin.first_crossing):
+            return None
+        return float(self.margin.first_crossing)
+
+    def undercut(self, bounds: Array) -> list[int]:
+        """Return the instants whose exact margin lies below their bound (N,)."""
+        return [
+            k
+            for k, one in enumerate(self.instants)
+            if one.basis is Basis.EXACT and one.delay < bounds[k]
+        ]
+
+    def count(self, basis: Basis) -> int:
+        """Return how many instants were decided in a way."""
+        return sum(one.basis is basis for one in self.instants)
+
+
+def local_of(system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> Local:
+    """Decide stability and margin of the law that runs at every instant of a motion.
+
+    Each instant is a loop that holds the instant's configuration. It is frozen in that
+    configuration and, where the law sags, where it rests with the references as they are; the
+    smaller margin counts. Where the law has a potential, rests at the instant itself, joints
+    determine all motions and the drives are ideal, a strict minimum of the potential is stable
+    without delay, and the passive bound lies below the margin (V̇ ≤ 0 for delays up to it): such an
+    instant is decided exactly only if its bound lies below the smallest margin known. All others
+    are decided exactly, up to MOST_EXACT.
+
+    Args:
+        system: the design.
+        motion: its instants.
+        spaces: the law's matrices along it.
+        bounds: of the certified criterion.
+    """
+    return _Decision(system, motion, spaces, bounds).run()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Known:
+    """What is known of one frozen loop."""
+
+    margin: DelayMargin | None
+    loop: FrozenLoop | None
+    rest: Rest
+    problem: str
+
+    @property
+    def roots(self) -> int:
+        return 0 if self.margin is None else self.margin.unstable_roots
+
+    @property
+    def delay(self) -> float | None:
+        """The margin, s; 0 where nothing balances or the law has no loop; None if not decided."""
+        if not self.rest.found or self.loop is None or self.roots:
+            return 0.0
+        return None if self.margin is None else float(self.margin.delay)
+
+    def order(self) -> tuple[float, int]:
+        """Smallest margin first, of zeros the most unstable, what is not known last."""
+        return (np.inf if self.delay is None else self.delay), -self.roots
+
+
+class _Decision:
+    """What is known so far."""
+
+    def __init__(self, system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> None:
+        self._system, self._motion, self._spaces, self._bounds = system, motion, spaces, bounds
+        self._found: list[InstantMargin] = [OPEN] * len(motion)
+        self._best: _Known | None = None
+        self._critical = 0
+
+    def run(self) -> Local:
+        count = len(self._motion)
+        minima = self._minima() if count > 1 else {}
+        for k in _spread(np.array([k for k in range(count) if k not in minima]), MOST_EXACT):
+            if self._decide(int(k)) and count > _FEW:
+                break
+        for k in minima:
+            delay = float(self._bounds.delay[k])
+            self._found[k] = InstantMargin(basis=Basis.BOUND, delay=delay)
+        for k in sorted(minima, key=lambda at: float(self._bounds.delay[at])):
+            if self._bounds.delay[k] >= self._least():
+                break
+            self._search(k, minima[k])
+        assert self._best is not None
+        return Local(
+            instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
+            loop=self._best.loop, rest=self._best.rest, problem=self._best.problem,
+        )  # fmt: skip
+
+    def _least(self) -> float:
+        return np.inf if self._best is None or self._best.delay is None else self._best.delay
+
+    def _search(self, k: int, links: FreeLinks) -> None:
+        """Look for crossings of a loop at a minimum that come before the smallest margin known."""
+        least, robot = self._least(), self._system.robot
+        loop = sea_loop(
+            self._system.actuators,
+            M=links.M,
+            H=links.H,
+            S=links.Z[robot.nv_base :],
+            C_z=np.zeros((robot.n, links.Z.shape[1])),
+            C_theta=-self._spaces.F_theta[k],
+            joint_damping=robot.damping,
+        )
+        try:
+            margin = margin_of(loop, at_most=None if np.isinf(least) else least)
+        except SolverError:
+            self._found[k] = OPEN
+            return
+        if margin.delay < least or np.isinf(least):
+            self._found[k] = InstantMargin(basis=Basis.EXACT, delay=float(margin.delay))
+            rest = self._system.in_posture(self._motion, k)
+            self._best = _Known(margin=margin, loop=loop, rest=rest, problem="")
+            self._critical = k
+        else:
+            self._found[k] = InstantMargin(basis=Basis.SEARCHED, delay=least)
+
+    def _decide(self, k: int) -> bool:
+        """Decide an instant exactly; return whether it is unstable without delay."""
+        states = [self._system.in_posture(self._motion, k)]
+        if not (self._system.law.rests_at_posture and states[0].found):
+            states.append(self._system.rest(self._motion, k))
+        worst = min((self._at(k, state) for state in states), key=_Known.order)
+        unstable = worst.delay == 0.0
+        if worst.delay is not None:
+            self._found[k] = InstantMargin(
+                basis=Basis.EXACT, delay=worst.delay, unstable_roots=worst.roots
+            )
+        if self._best is None or worst.order() < self._best.order():
+            self._best, self._critical = worst, k
+        return unstable
+
+    def _at(self, k: int, state: Rest) -> "_Known":
+        """What is known of the loop of an instant, frozen at a state."""
+        loop, margin, problem = None, None, state.reason
+        try:
+            loop = self._system.frozen(self._motion, k, rest=state)
+            margin = margin_of(loop)
+        except (ContractionError, SolverError) as error:
+            problem = problem or str(error)
+        return _Known(margin=margin, loop=loop, rest=state, problem=problem)
+
+    def _minima(self) -> dict[int, FreeLinks]:
+        """Links at the instants that a potential decides: stable, with a margin above the bound."""
+        system, spaces = self._system, self._spaces
+        good = (self._bounds.delay > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
+        if not (system.law.rests_at_posture and system.ideal_drives):
+            return {}
+        plants = [LinkPlant(system.robot, contacts) for contacts in self._motion.contact_sets]
+        found = {}
+        for k in np.flatnonzero(good).tolist():
+            links = self._minimum(plants[self._motion.contact_index[k]], k)
+            if links is not None:
+                found[k] = links
+        return found
+
+    def _minimum(self, plant: LinkPlant, k: int) -> FreeLinks | None:
+        """Links where the loop rests at the instant, in a strict minimum of the whole potential,
+        and joints determine all motions, so that the command is −F_θ δθ alone; else None."""
+        system, q, springs = self._system, self._motion.q[k], self._spaces.gravity[k]
+        links = plant.free(q, springs)
+        S, K = links.Z[system.robot.nv_base :], np.diag(system.actuators.spring_stiffness)
+        force = system.robot.gravity(q)
+        force[system.robot.nv_base :] -= springs
+        weight = max(9.81 * system.robot.mass, float(np.abs(springs).max(initial=0.0)))
+        if np.abs(links.Z.T @ force).max(initial=0.0) > _AT_REST * weight:
+            return None
+        if np.linalg.matrix_rank(S) < S.shape[1]:
+            return None
+        F = self._spaces.F_theta[k]
+        hessian = np.block([[links.H + S.T @ K @ S, -S.T @ K], [-K @ S, K + (F + F.T) / 2.0]])
+        values = np.linalg.eigvalsh(hessian)
+        return links if values[0] > _MINIMUM * values[-1] else None
+
+
+def margin_of(loop: FrozenLoop, **choices: object) -> DelayMargin:
+    """Return the exact margin of a frozen loop; see `sealag.margin.delay_margin`.
+
+    Args:
+        loop: the loop.
+        choices: what `delay_margin` may be asked besides.
+    """
+    return delay_margin(
+        loop.A_0,
+        loop.A_1,
+        A_e=loop.A_e,
+        embedded_delay=loop.embedded_delay,
+        symmetries=loop.symmetries,
+        **choices,  # pyright: ignore[reportArgumentType]
+    )
+
+
+def _spread(instants: Array, most: int) -> Array:
+    """The instants, or evenly spaced ones if there are more than `most`."""
+    if len(instants) <= most:
+        return instants
+    return instants[np.linspace(0, len(instants) - 1, most).astype(int)]

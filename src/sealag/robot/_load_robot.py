@@ -1,0 +1,77 @@
+"""From a URDF to a robot."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sealag.errors import RobotError
+from sealag.robot._load import check_inertias, read_model, reduce_model, resolve_urdf
+from sealag.robot._mimic import UNLIMITED, couple, position_limits
+from sealag.robot._robot import Robot
+from sealag.typing import Array
+
+
+def load_robot(
+    urdf: str | Path,
+    *,
+    floating_base: bool,
+    actuated: Sequence[str] | None = None,
+) -> Robot:
+    """Read a robot from a URDF; meshes are not needed.
+
+    Args:
+        urdf: a path, `bundled:hume.urdf`, or `example-robot-data:<path below robots>`.
+        floating_base: whether the root link moves freely.
+        actuated: names of the actuated joints; the other movable joints are locked at their
+            neutral position. None takes all that do not mimic another one. A joint that mimics an
+            actuated one follows it, one that mimics another is locked where that puts it.
+
+    Returns:
+        The robot; its `joints` are in the model's order, whatever the order of `actuated`.
+
+    Raises:
+        FileError: the file cannot be read.
+        RobotError: it is not a URDF of a robot with physical inertias and joints of one degree of
+            freedom, an actuated joint mimics another one, or moves almost no inertia.
+        UnknownNameError: an actuated joint, a bundled robot, or a link or joint that a joint of the
+            URDF names does not exist.
+    """
+    path = resolve_urdf(str(urdf))
+    said = read_model(path, floating_base=floating_base)
+    model, followers = reduce_model(said.model, path, actuated=actuated, followers=said.followers)
+    if model.nq - model.nv != (1 if floating_base else 0):
+        raise RobotError(f"{path}: a joint's position is not one number; that is not supported.")
+    coupling = couple(model, followers)
+    check_inertias(model, coupling, path)
+    count, n = len(coupling.offset), len(coupling.own)
+    every = [str(name) for name in model.names[-count:]]
+    names = tuple(every[k] for k in coupling.own)
+    lower, upper = position_limits(model, coupling, path)
+    friction = np.array([said.dynamics[name] for name in every])
+    ratio = np.abs(coupling.T[-count:, -n:])
+    return Robot(
+        name=model.name,
+        urdf_path=path,
+        urdf_sha256=said.sha256,
+        floating_base=floating_base,
+        joints=names,
+        followers=followers,
+        position_lower=lower,
+        position_upper=upper,
+        sliding=np.array([model.joints[model.getJointId(j)].shortname()[10] == "P" for j in names]),
+        velocity_limit=_limit(model.velocityLimit[-count:][coupling.own]),
+        effort_limit=_limit(model.effortLimit[-count:][coupling.own]),
+        rotor_inertia=np.square(ratio).T @ model.armature[-count:],
+        damping=np.square(ratio).T @ friction[:, 0],
+        friction=ratio.T @ friction[:, 1],
+        mass=float(sum(inertia.mass for inertia in model.inertias[1:])),
+        _model=model,
+    )
+
+
+def _limit(values: Array) -> Array:
+    """Limits as the URDF gives them; absent or huge ones are infinite."""
+    array = np.array(values, dtype=float)
+    array[~(np.abs(array) < UNLIMITED)] = np.inf
+    return array

@@ -1,0 +1,207 @@
+"""Checks of a URDF as it is written, before the parser merges links that are fixed together."""
+
+import math
+from collections import Counter
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from sealag.errors import RobotError, near
+from sealag.typing import Array
+
+ROOT_JOINT = "root_joint"
+"""Pinocchio's name for the joint of a floating base."""
+
+LEAST_INERTIA = 1e-9  # kg m², kg: of what an actuated joint moves
+_RESERVED = ("", ROOT_JOINT, "universe")
+_ENDS = ("lower", "upper")
+_ENTRIES = ("ixx", "ixy", "ixz", "ixy", "iyy", "iyz", "ixz", "iyz", "izz")
+_INDEFINITE = 1e-6  # of a body's inertia: what rounding in a URDF does to a principal moment
+_PLACEHOLDER = 0.2  # of a body's inertia: sensors and covers fixed to public robots reach 0.15
+
+
+def check_urdf(root: Element, path: Path) -> None:
+    """Refuse what the parser would accept, or refuse without saying why.
+
+    Args:
+        root: the URDF's root element.
+        path: what messages call it.
+
+    Raises:
+        RobotError: it is no URDF, its links are no tree, or a link or joint cannot be; the message
+            names it, its numbers and a remedy.
+        UnknownNameError: a joint names a link that does not exist.
+    """
+    if any("xacro" in element.tag for element in root.iter()):
+        raise RobotError(
+            f"{path} is a xacro file; expand it first: xacro {path.name} > robot.urdf."
+        )
+    if root.tag != "robot" or root.find("link") is None:
+        raise RobotError(f"{path} is not a URDF: it needs a <robot> with at least one <link>.")
+    if root.find("joint") is None:
+        raise RobotError(f"{path} has no joints, so there is nothing to actuate.")
+    _check_names(root, path)
+    _check_tree(root, path)
+    for joint in root.iterfind("joint"):
+        _check_joint(joint, path)
+    _check_inertias(root, path)
+
+
+def number(text: str) -> float:
+    """Return a number of the URDF; NaN if the text is none.
+
+    Args:
+        text: an attribute's value.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def joint_dynamics(joint: Element) -> tuple[float, float]:
+    """Return viscous damping and Coulomb friction of a joint, 0 where the URDF gives none.
+
+    Args:
+        joint: the joint's element.
+    """
+    given = joint.find("dynamics")
+    if given is None:
+        return 0.0, 0.0
+    return number(given.get("damping", "0")), number(given.get("friction", "0"))
+
+
+def _check_names(root: Element, path: Path) -> None:
+    for tag, reserved in (("link", ("",)), ("joint", _RESERVED)):
+        names = Counter(element.get("name", "") for element in root.iterfind(tag))
+        for name, count in names.items():
+            if name in reserved:
+                raise RobotError(f"{path}: a {tag} is called {name!r}; give it another name.")
+            if count > 1:
+                raise RobotError(
+                    f"{path}: {count} {tag}s are called {name}; every {tag} needs a name of its "
+                    "own."
+                )
+
+
+def _check_tree(root: Element, path: Path) -> None:
+    """Refuse links that do not hang together as one tree."""
+    links = [link.get("name", "") for link in root.iterfind("link")]
+    above: dict[str, tuple[str, str]] = {}  # joint that moves a link, and that joint's parent link
+    for joint in root.iterfind("joint"):
+        name, ends = joint.get("name", ""), []
+        for tag in ("parent", "child"):
+            end = joint.find(tag)
+            ends.append("" if end is None else end.get("link", ""))
+            if not ends[-1]:
+                raise RobotError(f'{path}: joint {name} needs <{tag} link="…"/>.')
+            if ends[-1] not in links:
+                raise near(ends[-1], links, what=f"link ({tag} of joint {name}) of {path.name}")
+        parent, child = ends
+        if child in above:
+            raise RobotError(
+                f"{path}: link {child} has two parents, {above[child][1]} (joint "
+                f"{above[child][0]}) and {parent} (joint {name}); remove one of the joints: closed "
+                "loops are not supported."
+            )
+        above[child] = name, parent
+    roots = [link for link in links if link not in above]
+    if len(roots) > 1:
+        raise RobotError(
+            f"{path}: links {', '.join(roots[:4])}{', …' if len(roots) > 4 else ''} have no "
+            "parent; a robot has one root: join the others to it, if need be by fixed joints."
+        )
+    for link in links:
+        way: list[str] = []
+        while link in above and link not in way:
+            way.append(link)
+            link = above[link][1]
+        if link in way:
+            loop = way[way.index(link) :]
+            raise RobotError(
+                f"{path}: joints {', '.join(above[one][0] for one in loop)} form a loop through "
+                f"links {', '.join(loop)}; the links must be a tree: let one of the joints hang "
+                "on a link outside the loop."
+            )
+
+
+def _check_joint(joint: Element, path: Path) -> None:
+    name, limit, axis = joint.get("name", ""), joint.find("limit"), joint.find("axis")
+    lower, upper = (limit.get(key, "0") if limit is not None else "0" for key in _ENDS)
+    if number(lower) > number(upper):
+        raise RobotError(
+            f"{path}: the limits of joint {name} are {lower} … {upper}; the lower one must "
+            "come first."
+        )
+    ways = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
+    if joint.get("type") != "fixed" and not any(map(number, ways.split())):
+        raise RobotError(f"{path}: the axis of joint {name} is zero; it needs a direction.")
+    for what, value in zip(("damping", "friction"), joint_dynamics(joint), strict=True):
+        if not 0.0 <= value < math.inf:
+            raise RobotError(
+                f"{path}: the {what} of joint {name} is {value:g}; <dynamics> needs a finite "
+                "number of at least 0."
+            )
+
+
+def _check_inertias(root: Element, path: Path) -> None:
+    """Refuse links that are no rigid bodies: I ≽ 0 and its largest moment ≤ the other two's sum.
+
+    Deviations are measured against the largest moments of the link and of all that is fixed to it:
+    what small parts get wrong is not what moves, which `check_bodies` looks at.
+    """
+    moments = {
+        link.get("name", ""): _principal_moments(link, path) for link in root.iterfind("link")
+    }
+    body = {name: name for name in moments}
+
+    def rigid(name: str) -> str:
+        while body[name] != name:
+            name = body[name]
+        return name
+
+    for joint in root.iterfind("joint[@type='fixed']"):
+        ends = [joint.find(tag) for tag in ("parent", "child")]
+        parent, child = (rigid(end.get("link", "")) for end in ends if end is not None)
+        body[child] = parent
+    size: Counter[str] = Counter()
+    for name, values in moments.items():
+        size[rigid(name)] += max(float(values[2]), 0.0)  # pyright: ignore[reportArgumentType]
+    for name, (least, middle, largest) in moments.items():
+        whole = max(size[rigid(name)], LEAST_INERTIA)
+        have = f"link {name} has principal moments of inertia {least:.3g}, {middle:.3g} and "
+        if least < -_INDEFINITE * whole:
+            raise RobotError(
+                f"{path}: {have}{largest:.3g} kg m²; none can be negative: correct <inertia> there."
+            )
+        if largest - middle - least > _PLACEHOLDER * whole:
+            raise RobotError(
+                f"{path}: {have}{largest:.3g} kg m²; no body's largest one exceeds the sum of the "
+                "others (triangle inequality): correct <inertia> there."
+            )
+
+
+def _principal_moments(link: Element, path: Path) -> Array:
+    """Principal moments (3,) of a link in rising order, kg m²; 0 without <inertial>."""
+    inertial, name = link.find("inertial"), link.get("name", "")
+    if inertial is None:
+        return np.zeros(3)
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    if mass is None or inertia is None:
+        raise RobotError(f"{path}: <inertial> of link {name} needs both <mass> and <inertia>.")
+    weight = mass.get("value", "")
+    if not 0.0 <= number(weight) < math.inf:
+        raise RobotError(
+            f"{path}: the mass of link {name} is {weight!r}; it must be a finite number of kg, at "
+            "least 0."
+        )
+    for key in _ENTRIES:
+        if not math.isfinite(number(inertia.get(key, ""))):
+            raise RobotError(
+                f"{path}: {key} of link {name} is {inertia.get(key, '')!r}; it must be a finite "
+                "number of kg m²."
+            )
+    return np.linalg.eigvalsh(
+        np.array([number(inertia.get(key, "")) for key in _ENTRIES]).reshape(3, 3)
+    )

@@ -1,0 +1,301 @@
+"""The frozen closed loop at one configuration: one law and one plant, contacts eliminated."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sealag.actuation import Actuators, motor_parameters
+from sealag.robot import Contact, Robot
+from sealag.typing import Array
+from sealag.whole_body._evaluation import LawEvaluation
+from sealag.whole_body._law import Law
+from sealag.whole_body._links import FreeLinks, LinkPlant, norm, null_space
+from sealag.whole_body._rest import Rest
+from sealag.whole_body._signals import LawDerivative
+
+_FELT = 1e-6
+"""Share of the law's stiffness from which it counts as feeling a motion of the whole robot. Central
+differences leave 1e-9 where it feels none; a task that feels one feels it with its whole gain."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrozenLoop:
+    """ẋ = A_0 x + B C x(t − d) + A_e x(t − e) about a rest, x = [z, θ, ż, θ̇, τ_m, ξ].
+
+    z are coordinates along the motions that contacts leave free, δq = Z z, without conserved
+    momentum that the law feels; τ_m motor torques of drives with a bandwidth; ξ the law's memory.
+
+    Attributes:
+        A_0: (N, N) what acts without delay: links, springs, drives, damping.
+        B: (N, n) what a command τ_osc does, late by d.
+        C: (n, N) the command δτ_osc of a state.
+        A_e: (N, N) torque feedback of the drives, late by e; 0 if the design does not delay it.
+        embedded_delay: e, s.
+        states: names of the states.
+        symmetries: (N, s) states along which nothing acts, because gravity, contacts and the law do
+            not change: yaw about a point foot, translation of a free robot, unless a task feels it.
+    """
+
+    A_0: Array
+    B: Array
+    C: Array
+    A_e: Array
+    embedded_delay: float
+    states: tuple[str, ...]
+    symmetries: Array
+
+    @property
+    def A_1(self) -> Array:
+        """(N, N) the law's part, late by d."""
+        return self.B @ self.C
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Where the parts of a state lie."""
+
+    k: int
+    n: int
+    drives: int
+    memory_size: int
+
+    @property
+    def size(self) -> int:
+        return 2 * (self.k + self.n) + self.drives + self.memory_size
+
+    @property
+    def z(self) -> slice:
+        return slice(0, self.k)
+
+    @property
+    def theta(self) -> slice:
+        return slice(self.k, self.k + self.n)
+
+    @property
+    def z_rate(self) -> slice:
+        return slice(self.k + self.n, 2 * self.k + self.n)
+
+    @property
+    def theta_rate(self) -> slice:
+        return slice(2 * self.k + self.n, 2 * (self.k + self.n))
+
+    @property
+    def torque(self) -> slice:
+        return slice(2 * (self.k + self.n), 2 * (self.k + self.n) + self.drives)
+
+    @property
+    def memory(self) -> slice:
+        return slice(self.size - self.memory_size, self.size)
+
+    def take(self, part: slice, values: Array) -> Array:
+        """(p, N) rows that read `values` (p, width) of a part."""
+        out = np.zeros((len(values), self.size))
+        out[:, part] = values
+        return out
+
+    def names(self, joints: tuple[str, ...], drives: Array) -> tuple[str, ...]:
+        angles = [f"z{i}" for i in range(self.k)] + [f"theta:{joint}" for joint in joints]
+        rates = [f"d/dt {name}" for name in angles]
+        torques = [f"drive:{joints[i]}" for i in drives]
+        return (*angles, *rates, *torques, *(f"tank:{i}" for i in range(self.memory_size)))
+
+
+def freeze(
+    robot: Robot,
+    law: Law,
+    actuators: Actuators,
+    posture: Array,
+    *,
+    contacts: tuple[Contact, ...],
+    rest: Rest,
+    embedded_delay: float | None = None,
+) -> FrozenLoop:
+    """Freeze the closed loop of the law that runs, where it rests.
+
+    Links: Zᵀ M Z z̈ + Zᵀ D_j Z ż + H z = Sᵀ τ_sea with S = U Z, τ_sea = K (θ − S z) + D_s (θ̇ − S ż),
+    D_j the joints' own damping, and H as in `LinkPlant.free`. Motors and drives: the generator of
+    the kernel that simulates them. The command: the derivative of what the controller ticks.
+
+    Args:
+        robot: the robot.
+        law: the law.
+        actuators: springs, motors and drives.
+        posture: (nq,) configuration that the law holds.
+        contacts: which frames are held.
+        rest: where the loop rests, from `rest_of`.
+        embedded_delay: how late torque feedback is in the drives, s; None for without delay.
+
+    Returns:
+        The frozen loop.
+
+    Raises:
+        ContractionError: q̄(θ) is fed back and does not exist.
+    """
+    evaluation = LawEvaluation(
+        robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
+    )
+    command = law.signal.start(evaluation, delay_bound=0.0).derivative(rest.q, rest.theta)
+    links = LinkPlant(robot, contacts).free(rest.q, rest.tau_sea)
+    links, kept, C_z, B_z = _without_momentum(links, command)
+    return sea_loop(
+        actuators,
+        M=links.M,
+        H=links.H,
+        S=links.Z[robot.nv_base :],
+        joint_damping=robot.damping,
+        C_z=C_z,
+        C_theta=command.C_theta,
+        memory=Memory(
+            A=command.A, B_z=B_z, B_theta=command.B_theta, B_rate=command.B_rate, C=command.C
+        ),
+        symmetries=kept,
+        embedded_delay=embedded_delay,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Memory:
+    """Memory ξ of a law, in coordinates z of the links: ξ̇ = A ξ + B_z z + B_theta θ + B_rate θ̇, and
+    C ξ of the command.
+
+    Attributes:
+        A: (s, s) 1/s.
+        B_z: (s, k).
+        B_theta: (s, n).
+        B_rate: (s, n).
+        C: (n, s).
+    """
+
+    A: Array
+    B_z: Array
+    B_theta: Array
+    B_rate: Array
+    C: Array
+
+
+def sea_loop(
+    actuators: Actuators,
+    *,
+    M: Array,
+    H: Array,
+    S: Array,
+    C_z: Array,
+    C_theta: Array,
+    joint_damping: Array | float = 0.0,
+    memory: Memory | None = None,
+    symmetries: Array | None = None,
+    embedded_delay: float | None = None,
+) -> FrozenLoop:
+    """Build the loop of links, springs, motors, drives and a late linear command.
+
+    M z̈ + Sᵀ D_j S ż + H z = Sᵀ τ_sea, τ_sea = K (θ − S z) + D_s (θ̇ − S ż), motors and drives as in
+    the kernel that simulates them, δτ_osc = C_z z + C_theta θ + C ξ late by d.
+
+    Args:
+        actuators: springs, motors and drives of n joints.
+        M: (k, k) inertia of the links, kg m².
+        H: (k, k) their stiffness, Nm/rad.
+        S: (n, k) joint angles of z.
+        C_z: (n, k) command of z, Nm/rad.
+        C_theta: (n, n) command of θ, Nm/rad.
+        joint_damping: (n,) or one number, D_j, Nms/rad.
+        memory: what the law remembers; None for nothing.
+        symmetries: (k, s) z along which nothing acts.
+        embedded_delay: e, how late torque feedback is in the drives, s; None for without delay.
+    """
+    n, k = S.shape
+    drives = np.flatnonzero(np.isfinite(actuators.torque_bandwidth))
+    at = _Places(k, n, len(drives), 0 if memory is None else len(memory.A))
+    one = np.eye(n)
+    angle, rate = at.take(at.theta, one), at.take(at.theta_rate, one)
+    link, link_rate = at.take(at.z, S), at.take(at.z_rate, S)
+    torque = np.zeros((n, at.size))
+    torque[drives, np.arange(at.size)[at.torque]] = 1.0
+    spring = actuators.spring_stiffness[:, None] * (angle - link)
+    spring += actuators.spring_damping[:, None] * (rate - link_rate)
+    drag = np.broadcast_to(joint_damping, n)[:, None] * link_rate
+    rows = _motor_rows(actuators, instant=embedded_delay is None)
+    moved = np.stack([angle, rate, torque, link, link_rate])
+    A_0, B = np.zeros((at.size, at.size)), np.zeros((at.size, n))
+    A_0[at.z, at.z_rate], A_0[at.theta, at.theta_rate] = np.eye(k), one
+    A_0[at.z_rate] = np.linalg.solve(M, S.T @ (spring - drag) - at.take(at.z, H))
+    A_0[at.theta_rate] = np.einsum("pi,pij->ij", rows.speed, moved)
+    A_0[at.torque] = np.einsum("pi,pij->ij", rows.torque, moved)[drives]
+    B[at.theta_rate] = np.diag(rows.speed_command)
+    B[at.torque] = np.diag(rows.torque_command)[drives]
+    C = at.take(at.z, C_z) + at.take(at.theta, C_theta)
+    if memory is not None:
+        C[:, at.memory] = memory.C
+        A_0[at.memory, at.memory], A_0[at.memory, at.z] = memory.A, memory.B_z
+        A_0[at.memory, at.theta] = memory.B_theta
+        A_0[at.memory, at.theta_rate] = memory.B_rate
+    kept = np.zeros((k, 0)) if symmetries is None else symmetries
+    return FrozenLoop(
+        A_0=A_0,
+        B=B,
+        C=C,
+        A_e=np.zeros_like(A_0) if embedded_delay is None else B @ (rows.shift[:, None] * spring),
+        embedded_delay=embedded_delay or 0.0,
+        states=at.names(actuators.joints, drives),
+        symmetries=at.take(at.z, kept.T).T,
+    )
+
+
+def _without_momentum(
+    links: FreeLinks, command: LawDerivative
+) -> tuple[FreeLinks, Array, Array, Array]:
+    """Split off rigid motions: those that the law does not feel are symmetries; of those that it
+    feels the conserved momentum is left out, z are motions without it, rᵀ M z = 0.
+
+    No delay moves the zero roots of what is conserved.
+
+    Returns:
+        Links, symmetries (k, s), and the command's and the memory's columns of z.
+    """
+    rigid, M = links.rigid, links.M
+    felt_by = np.vstack([command.C_q, command.B_q]) @ links.Z
+    size = max(norm(felt_by), norm(command.C_theta)) * _FELT / 1e-9
+    kept = rigid @ null_space(felt_by @ rigid, rigid.shape[1], size=size)
+    felt_by = felt_by @ (np.eye(len(M)) - kept @ np.linalg.pinv(kept))
+    felt = rigid @ null_space(kept.T @ M @ rigid, rigid.shape[1], size=norm(M))
+    Y = null_space(felt.T @ M, len(M), size=norm(M))
+    links = replace(links, Z=links.Z @ Y, M=Y.T @ M @ Y, H=Y.T @ links.H @ Y, rigid=Y.T @ rigid)
+    felt_by = felt_by @ Y
+    n = len(command.C_q)
+    return links, Y.T @ kept, felt_by[:n], felt_by[n:]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _MotorRows:
+    """Rates of motor speeds and drive torques (5, n): what angle, speed, drive torque, link angle
+    and link speed do; and what a command (n,) and late torque feedback (n,) do."""
+
+    speed: Array
+    torque: Array
+    speed_command: Array
+    torque_command: Array
+    shift: Array
+
+
+def _motor_rows(actuators: Actuators, *, instant: bool) -> _MotorRows:
+    """Take the rows from the generator that moves the motors in the simulator."""
+    from sealag.kernels import motor
+
+    moved = [motor.ANGLE, motor.SPEED, motor.TORQUE, motor.LINK, motor.LINK_SPEED]
+    A, forms = (
+        np.zeros((motor.SIZE, motor.SIZE)),
+        np.zeros((motor.PRODUCTS, motor.SIZE, motor.SIZE)),
+    )
+    every = []
+    for one in motor_parameters(actuators):
+        motor.generator(one, 1.0 if instant else 0.0, motor.REGULAR, A, forms)
+        every.append(A.copy())
+    stacked = np.array(every)
+    ratio = actuators.rotor_inertia / actuators.shaped_inertia
+    return _MotorRows(
+        speed=stacked[:, motor.SPEED, moved].T,
+        torque=stacked[:, motor.TORQUE, moved].T,
+        speed_command=stacked[:, motor.SPEED, motor.COMMAND],
+        torque_command=stacked[:, motor.TORQUE, motor.COMMAND],
+        shift=(1.0 - ratio) / ratio,
+    )

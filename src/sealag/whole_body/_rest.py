@@ -1,0 +1,261 @@
+"""Where the loop rests: the equilibrium of links, springs, contacts and law."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.actuation import Actuators
+from sealag.errors import ContractionError
+from sealag.robot import Contact, Robot
+from sealag.typing import Array
+from sealag.whole_body._evaluation import LawEvaluation
+from sealag.whole_body._law import Law
+from sealag.whole_body._links import LinkPlant, null_space
+from sealag.whole_body._signals import SignalState
+
+_BALANCED = 1e-10
+"""Share of weight and torques that may be left over. Ten times smaller is rounding of the law; at
+ten times larger the margin's last digits move."""
+
+_AT_POSTURE = 1e-7
+"""The same of gravity that contacts must balance in the posture, whose angles are rounded."""
+
+_PLACED = 1e-12  # m, rad: how far a contact may be from where the posture has it
+_ROUNDS = 60
+_LONGEST_STEP = 0.2  # rad: a longer Newton step leaves the region where its direction is good
+_HALVINGS = 12
+_CUTOFF = 1e-10  # of the largest singular value: directions along which nothing acts (symmetries)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rest:
+    """Where the loop rests while it holds a posture.
+
+    Attributes:
+        q: (nq,) configuration; the posture itself if none was found.
+        theta: (n,) motor angles, rad.
+        tau_sea: (n,) spring torque there, Nm.
+        found: whether all balances: links, springs, motors and contacts.
+        moved: largest distance of a joint from the posture, rad or m.
+        reason: why there is none, in words; empty if it was found.
+    """
+
+    q: Array
+    theta: Array
+    tau_sea: Array
+    found: bool
+    moved: float
+    reason: str
+
+
+def rest_of(
+    robot: Robot,
+    law: Law,
+    actuators: Actuators,
+    posture: Array,
+    *,
+    contacts: tuple[Contact, ...],
+) -> Rest:
+    """Find the equilibrium near a posture that the law holds.
+
+    U^T τ = g − J_sᵀ λ, τ = K (θ − q_j) = τ_osc(q, θ) with contacts where the posture has them, by
+    Newton's method with the derivative of the law that runs. A law that compensates gravity at the
+    static joint state rests at the posture; one that feeds back motor angles sags.
+
+    Args:
+        robot: the robot.
+        law: the law.
+        actuators: its springs.
+        posture: (nq,) configuration that the law holds.
+        contacts: which frames are held.
+
+    Raises:
+        RobotError: the mass matrix is not positive definite.
+    """
+    return _Search(robot, law, actuators, posture, contacts).run()
+
+
+def posture_of(
+    robot: Robot,
+    law: Law,
+    actuators: Actuators,
+    posture: Array,
+    *,
+    contacts: tuple[Contact, ...],
+) -> Rest:
+    """Return the loop's state in the posture: tasks without error, springs that carry gravity.
+
+    It is where the loop rests if its references are corrected for the sag of a law that feeds back
+    motor angles, or if an operator has brought it there.
+
+    Args:
+        robot: the robot.
+        law: the law.
+        actuators: its springs.
+        posture: (nq,) configuration.
+        contacts: which frames are held.
+
+    Raises:
+        RobotError: the mass matrix is not positive definite.
+    """
+    return _Search(robot, law, actuators, posture, contacts).posture()
+
+
+class _Search:
+    """Newton's method on q and θ."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        law: Law,
+        actuators: Actuators,
+        posture: Array,
+        contacts: tuple[Contact, ...],
+    ) -> None:
+        K = actuators.spring_stiffness
+        self._robot, self._K, self._posture = robot, K, np.asarray(posture, dtype=float)
+        evaluation = LawEvaluation(robot, law, K, contacts=contacts, posture=posture)
+        self._evaluation = evaluation
+        self._signal: SignalState = law.signal.start(evaluation, delay_bound=0.0)
+        self._plant = LinkPlant(robot, contacts)
+        self._places = self._plant.places(self._posture)
+        self._scale = max(9.81 * robot.mass, float(np.abs(robot.gravity(posture)).max()), 1e-3)
+
+    def run(self) -> Rest:
+        """Return the equilibrium, or the posture with why there is none."""
+        q, theta = self._posture, self._first(self._posture)
+        try:
+            residual = self._residual(q, theta)
+            for _ in range(_ROUNDS):
+                if self._small(residual):
+                    return self._answer(q, theta, "")
+                step = self._newton(q, theta, residual)
+                q, theta, residual, better = self._search(q, theta, step, residual)
+                if not better:
+                    break
+        except ContractionError as error:
+            return self._answer(self._posture, self._first(self._posture), str(error))
+        return self._answer(self._posture, self._held(), self._why())
+
+    def posture(self) -> Rest:
+        """Return the state in the posture."""
+        q, base = self._posture, self._robot.nv_base
+        joints = self._robot.joint_positions(q)
+        evaluation = self._evaluation
+        evaluation.follow(q)
+        carried = evaluation.space.gravity.copy()
+        left = self._robot.gravity(q)
+        left[base:] -= carried
+        Z = null_space(self._plant.jacobian(q), self._robot.nv)
+        balanced = np.abs(Z.T @ left).max(initial=0.0) < _AT_POSTURE * self._scale
+        reason = "" if balanced else self._why()
+        return Rest(
+            q=q,
+            theta=joints + self._signal.wound(carried),
+            tau_sea=carried,
+            found=not reason,
+            moved=0.0,
+            reason=reason,
+        )
+
+    def _first(self, q: Array) -> Array:
+        """Motor angles whose springs carry gravity as far as contacts do not."""
+        torque = self._robot.gravity(q) - self._plant.support(q)
+        return self._robot.joint_positions(q) + torque[self._robot.nv_base :] / self._K
+
+    def _held(self) -> Array:
+        """Motor angles that rest under the law while the links are held in the posture."""
+        joints, theta = self._robot.joint_positions(self._posture), self._first(self._posture)
+        out = np.zeros(self._robot.n)
+        try:
+            for _ in range(_ROUNDS):
+                self._signal.settled(self._posture, theta, out)
+                theta, last = joints + out / self._K, theta
+                if np.abs(theta - last).max(initial=0.0) < _PLACED:
+                    return theta
+        except ContractionError:
+            pass
+        return self._first(self._posture)
+
+    def _residual(self, q: Array, theta: Array) -> tuple[Array, Array, Array]:
+        """Contact displacement (c,), forces along free motions (k,), torque left at motors (n,)."""
+        joints = self._robot.joint_positions(q)
+        springs, command = self._K * (theta - joints), np.zeros(self._robot.n)
+        self._signal.settled(q, theta, command)
+        force = self._robot.gravity(q)
+        force[self._robot.nv_base :] -= springs
+        Z = null_space(self._plant.jacobian(q), self._robot.nv)
+        return self._plant.displacement(q, self._places), Z.T @ force, springs - command
+
+    def _small(self, residual: tuple[Array, Array, Array]) -> bool:
+        away, force, torque = (float(np.abs(part).max(initial=0.0)) for part in residual)
+        return away < _PLACED and max(force, torque) < _BALANCED * self._scale
+
+    def _size(self, residual: tuple[Array, Array, Array]) -> float:
+        away, force, torque = (float(np.linalg.norm(part)) for part in residual)
+        return away + (force + torque) / self._scale
+
+    def _newton(self, q: Array, theta: Array, residual: tuple[Array, Array, Array]) -> Array:
+        """Step (nv + n,) of least norm."""
+        robot, n, K = self._robot, self._robot.n, np.diag(self._K)
+        base = robot.nv_base
+        J_s = self._plant.jacobian(q)
+        Z = null_space(J_s, robot.nv)
+        springs = self._K * (theta - robot.joint_positions(q))
+        H = self._plant.stiffness(q, springs, np.eye(robot.nv))
+        H[base:, base:] += K
+        coupling = np.vstack([np.zeros((base, n)), -K])
+        slope = self._signal.derivative(q, theta)
+        C_q, C_theta = slope.C_q, slope.C_theta
+        if len(slope.A):  # at rest the memory has settled: A ξ + B δ = 0
+            follow = slope.C @ np.linalg.inv(-slope.A)
+            C_q, C_theta = C_q + follow @ slope.B_q, C_theta + follow @ slope.B_theta
+        motors = np.hstack([-np.hstack([np.zeros((n, base)), K]) - C_q, K - C_theta])
+        rows = [
+            np.hstack([J_s, np.zeros((len(J_s), n))]),
+            np.hstack([Z.T @ H, Z.T @ coupling]) / self._scale,
+            motors / self._scale,
+        ]
+        away, force, torque = residual
+        right = np.concatenate([away, force / self._scale, torque / self._scale])
+        return -np.linalg.lstsq(np.vstack(rows), right, rcond=_CUTOFF)[0]
+
+    def _search(
+        self, q: Array, theta: Array, step: Array, residual: tuple[Array, Array, Array]
+    ) -> tuple[Array, Array, tuple[Array, Array, Array], bool]:
+        """Follow the step as far as the residual falls."""
+        nv, before = self._robot.nv, self._size(residual)
+        share = min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+        for _ in range(_HALVINGS):
+            new_q = self._robot.integrate(q, share * step[:nv])
+            new_theta = theta + share * step[nv:]
+            try:
+                new = self._residual(new_q, new_theta)
+            except ContractionError:
+                new = None
+            if new is not None and (self._size(new) < before or self._small(new)):
+                return new_q, new_theta, new, True
+            share /= 2.0
+        return q, theta, residual, False
+
+    def _why(self) -> str:
+        left = self._robot.gravity(self._posture) - self._plant.support(self._posture)
+        base = float(np.abs(left[: self._robot.nv_base]).max(initial=0.0))
+        if base > 1e-6 * self._scale:
+            return (
+                f"contacts leave {base:.3g} N or Nm of gravity at the base that no contact force "
+                "balances, and no posture nearby is balanced"
+            )
+        return "no balance of springs, gravity and law was found near the posture"
+
+    def _answer(self, q: Array, theta: Array, reason: str) -> Rest:
+        joints = self._robot.joint_positions(q)
+        moved = np.abs(joints - self._robot.joint_positions(self._posture))
+        return Rest(
+            q=q,
+            theta=theta,
+            tau_sea=self._K * (theta - joints),
+            found=not reason,
+            moved=float(moved.max(initial=0.0)),
+            reason=reason,
+        )
