@@ -61,6 +61,11 @@ class RoundTrip:
         return self.up.delay.lower_bound + self.down.delay.lower_bound
 
     @property
+    def steepest_fall(self) -> float:
+        """Sum of both ways' steepest falls, s/s."""
+        return self.up.delay.steepest_fall + self.down.delay.steepest_fall
+
+    @property
     def mean(self) -> float:
         """Sum of both ways' mean delays, s."""
         return self.up.delay.mean + self.down.delay.mean
@@ -168,6 +173,8 @@ class Delays:
         """Upper bound of the feedforward path's delay, s."""
         down = self.central.down.late_bound(self.sample_time)
         drive = self.embedded.down.late_bound(self.embedded_period or self.sample_time)
+        if self.embedded.down.overtaken and not self.embedded_period:
+            drive += self.central.down.spread  # packets overtake that left together
         return down + drive + self.sample_time + 2.0 * self.embedded_period
 
     @property
