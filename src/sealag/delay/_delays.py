@@ -179,11 +179,12 @@ class Delays:
 
     @property
     def torque_feedback_delay(self) -> float | None:
-        """Upper bound e of how late the drives' torque feedback is, s; None if it is immediate."""
+        """Upper bound e of how late the drives' torque feedback is, with the wait for the next
+        exchange and the hold until the one after, s; None if it is immediate."""
         if not self.delayed_torque_feedback:
             return None
         period = self.embedded_period or self.sample_time
-        return self.embedded.up.late_bound(period) + self.embedded_period
+        return self.embedded.up.late_bound(period) + 2.0 * self.embedded_period
 
     def d_1_at(self, t: float | Array) -> float | Array:
         """Return the position feedback's total delay with its mean hold of half a period.
