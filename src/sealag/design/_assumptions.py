@@ -76,7 +76,9 @@ def _of_delays(system: System) -> Iterator[tuple[str, str]]:
     delays = system.delays
     yield (
         "delay_bound",
-        f"d_1 is at most {time_text(delays.d_1)}; it may vary below that as it likes (order, "
+        f"d_1 is at most {time_text(delays.d_1)}, with the hold of a controller period of "
+        f"{time_text(delays.sample_time)} (sample_time_ms; 1 ms where the design states none); it "
+        "may vary below that as it likes (order, "
         "phase_rad, angular_frequency_rad_s, time_s and period_s of the delays shape a run only).",
     )
     ways = {
