@@ -16,10 +16,18 @@ from sealag.design import certified_bounds, load, published_bounds
 from sealag.errors import SolverError
 from sealag.margin import delay_margin, rightmost_roots
 from sealag.robot import Contact, ContactKind, Motion
-from sealag.whole_body import Feedback, GravityCompensation, Linearisation, Task
+from sealag.whole_body import (
+    FrozenLoop,
+    GravityCompensation,
+    LinkPlant,
+    MotorAngles,
+    StaticJoint,
+    Tank,
+    Task,
+)
 
 SEED, DRAWS = 4, 130
-MOTOR, STATIC, TANK = Feedback.MOTOR, Feedback.STATIC_JOINT, Feedback.STATIC_JOINT_TANK
+MOTOR, STATIC, TANK = MotorAngles(), StaticJoint(), Tank(rate=0.0)
 PLANNED, DELAYED = GravityCompensation.PLANNED, GravityCompensation.FEEDBACK
 
 CASES = [
@@ -35,7 +43,7 @@ CASES = [
     ("baxter", STATIC, DELAYED, 100),
     ("baxter", TANK, DELAYED, 5),
 ]
-"""Design, feedback, gravity, and how many configurations are compared."""
+"""Design, signal, gravity, and how many configurations are compared."""
 
 
 def clamped(frame):
@@ -50,14 +58,14 @@ def design(name):
         return system
     stiff = replace(system.actuators, spring_stiffness=np.full(system.robot.n, 2e4))
     if robot == "hume":
-        tasks = tuple(replace(t, stiffness=10.0 * t.stiffness) for t in system.hierarchy.tasks)
+        tasks = tuple(replace(t, stiffness=10.0 * t.stiffness) for t in system.law.tasks)
         contacts = (clamped("right_foot"), Contact(frame="left_foot"))
     else:
         posture = Task(name="posture", kind="posture", stiffness=np.array(100.0), priority=2)
-        tasks, contacts = (*system.hierarchy.tasks, posture), (clamped("LF_FOOT"),)
+        tasks, contacts = (*system.law.tasks, posture), (clamped("LF_FOOT"),)
     return replace(
         system,
-        hierarchy=replace(system.hierarchy, tasks=tasks),
+        law=replace(system.law, tasks=tasks),
         actuators=stiff,
         contacts=contacts if name.startswith("clamped") else contacts[:1],
     )
@@ -67,7 +75,7 @@ def design(name):
 class Compared:
     """A configuration: its frozen loop, exact margin, and both criteria's bounds."""
 
-    loop: Linearisation
+    loop: FrozenLoop
     margin: float
     certified: float
     published: float
