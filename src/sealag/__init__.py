@@ -9,19 +9,72 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _HOME = {
-    "load": "sealag.design",
+    "System": "sealag.design",
     "certify": "sealag.design",
+    "load": "sealag.design",
+    "load_motion": "sealag.design",
     "simulate": "sealag.design",
+    "verify_design": "sealag.design",
     "Controller": "sealag.whole_body",
+    "Law": "sealag.whole_body",
+    "LinkAngles": "sealag.whole_body",
+    "Measurement": "sealag.whole_body",
+    "MotorAngles": "sealag.whole_body",
+    "StaticJoint": "sealag.whole_body",
+    "Tank": "sealag.whole_body",
+    "Task": "sealag.whole_body",
+    "Contact": "sealag.robot",
+    "Motion": "sealag.robot",
+    "load_robot": "sealag.robot",
+    "actuators": "sealag.actuation",
+    "Constant": "sealag.delay",
+    "Delays": "sealag.delay",
+    "Sinusoid": "sealag.delay",
     "SealagError": "sealag.errors",
 }
 
-__all__ = ["Controller", "SealagError", "__version__", "certify", "load", "simulate"]
+__all__ = [
+    "Constant",
+    "Contact",
+    "Controller",
+    "Delays",
+    "Law",
+    "LinkAngles",
+    "Measurement",
+    "Motion",
+    "MotorAngles",
+    "SealagError",
+    "Sinusoid",
+    "StaticJoint",
+    "System",
+    "Tank",
+    "Task",
+    "__version__",
+    "actuators",
+    "certify",
+    "load",
+    "load_motion",
+    "load_robot",
+    "simulate",
+    "verify_design",
+]
 
 if TYPE_CHECKING:
-    from sealag.design import certify, load, simulate
+    from sealag.actuation import actuators
+    from sealag.delay import Constant, Delays, Sinusoid
+    from sealag.design import System, certify, load, load_motion, simulate, verify_design
     from sealag.errors import SealagError
-    from sealag.whole_body import Controller
+    from sealag.robot import Contact, Motion, load_robot
+    from sealag.whole_body import (
+        Controller,
+        Law,
+        LinkAngles,
+        Measurement,
+        MotorAngles,
+        StaticJoint,
+        Tank,
+        Task,
+    )
 
 
 def __getattr__(name: str) -> Any:

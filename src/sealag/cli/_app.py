@@ -11,7 +11,10 @@ import typer
 from typer.exceptions import TyperException
 
 from sealag import __version__
-from sealag.errors import SealagError
+from sealag.errors import SealagError, SolverError
+
+WRONG_INPUT, FAILED = 2, 3
+"""Exit statuses besides 0, yes, and 1, a decided no."""
 
 INTERRUPTED = 130
 """Exit status with which Typer answers Ctrl-C."""
@@ -20,7 +23,7 @@ app = typer.Typer(
     name="sealag",
     help="How much network delay a robot with springs in its joints tolerates.",
     epilog="Exit status: 0 done, 1 the answer is no (not certified, certificate does not hold), "
-    "2 the input is wrong, 130 interrupted.",
+    "2 the input is wrong, 3 the tool failed, 130 interrupted.",
     context_settings={"help_option_names": ["-h", "--help"]},
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -227,8 +230,8 @@ def show_json(answer: dict[str, Any]) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and end the process with its status.
 
-    0 done, 1 the answer is no, 2 the input is wrong, 130 interrupted. Wrong input is told in one
-    sentence on standard error.
+    0 done, 1 the answer is no, 2 the input is wrong, 3 the tool failed, 130 interrupted. Wrong
+    input and failures are told in one sentence on standard error.
 
     Args:
         arguments: what follows the program's name; the process's own if None.
@@ -240,7 +243,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except SealagError as error:
         line = str(error).replace("\n", "\\n")
         print(f"sealag: {line}", file=sys.stderr)
-        raise SystemExit(2) from None
+        raise SystemExit(FAILED if isinstance(error, SolverError) else WRONG_INPUT) from None
     except TyperException as error:
         known = {
             command.callback.__name__ for command in app.registered_commands if command.callback
@@ -248,10 +251,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
         asked = f"{words[0]} " if words[0] in known else ""
         problem = error.format_message().rstrip(".")
         print(f"sealag: {problem}; see sealag {asked}--help.", file=sys.stderr)
-        raise SystemExit(2) from None
+        raise SystemExit(WRONG_INPUT) from None
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(0) from None
+    except Exception as error:
+        words = " ".join(str(error).split())[:300]
+        print(
+            f"sealag: the tool itself failed ({type(error).__name__}: {words}); this is no answer "
+            "about the design. Please report it with the command and its files.",
+            file=sys.stderr,
+        )
+        raise SystemExit(FAILED) from None
     if status == INTERRUPTED:
         print("sealag: interrupted", file=sys.stderr)
     raise SystemExit(status or 0)

@@ -35,6 +35,19 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     return path
 
 
+def compile_kernels() -> None:
+    """Compile what is not in the cache yet, and say so: it takes minutes after an installation."""
+    from sealag.kernels import compile_all, compiled
+
+    if compiled():
+        return
+    print("sealag: compiling its kernels, once after the installation (minutes)", file=sys.stderr)
+    compile_all(
+        lambda name: print(f"sealag: compiling {name}", file=sys.stderr, flush=True),
+        missing_only=True,
+    )
+
+
 @contextmanager
 def _busy(what: str) -> Iterator[None]:
     """Say on a terminal's standard error what takes its time."""
@@ -68,6 +81,7 @@ def certify_project(
     path = out or Path(f"{resolve_project(project).stem}.certificate.json")
     system = load(project)
     check_output(path, *system.files, *([motion] if motion else []))
+    compile_kernels()
     with _busy("certifying"):
         certificate = certify(
             system,
@@ -88,7 +102,7 @@ def _stability(certificate: Certificate) -> str:
     """What is known of stability without delay, which a passive loop need not have."""
     if certificate.unstable_modes:
         count = certificate.unstable_modes
-        return f"no: {count} root{'s' * (count > 1)} unstable without delay (passive is not stable)"
+        return f"no: {count} root{'s' * (count > 1)} unstable without delay"
     if certificate.stable is None:
         return "not known"
     return "yes" if certificate.stable else "no"
@@ -108,7 +122,7 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
             "worst instant",
             f"{worst.instant} of {certificate.instants}, at {worst.time_s:.3f} s",
         ),
-        ("gives in first", limiting),
+        ("limiting joints", limiting),
         ("exact local margin", time_text(certificate.local_margin_s)),
         ("first crossing", time_text(certificate.first_crossing_s)),
         ("published criterion says", time_text(certificate.published_max_delay_s)),
@@ -125,7 +139,7 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
     for bound, reason in certificate.left_open.items():
         print(f"left open is a longer {bound}: {reason}")
     for assumption in certificate.assumptions:
-        print(f"assumes that {assumption.text}")
+        print(f"assumed: {assumption.text}")
 
 
 def margin_project(
@@ -141,6 +155,7 @@ def margin_project(
         )
     system = load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
+    compile_kernels()
     with _busy("computing margins"):
         found = local_margins(system, _motion(system, motion), horizon=horizon)
     answer: dict[str, Any] = found.summary()

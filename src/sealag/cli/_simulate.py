@@ -9,6 +9,7 @@ import numpy as np
 
 import sealag
 from sealag.cli._app import show_json
+from sealag.cli._commands import compile_kernels
 from sealag.design import System, load, resolve_project, scenario_duration, simulate
 from sealag.errors import InputError
 from sealag.files import check_output
@@ -42,6 +43,7 @@ def simulate_project(
         system.delays.scaled(delay_scale)
     except InputError as error:
         raise InputError(f"--delay-scale is {delay_scale:g}: {error}") from error
+    compile_kernels()
     run = _with_progress(
         "simulating",
         length,

@@ -117,7 +117,6 @@ class _Search:
         evaluation = LawEvaluation(robot, law, K, contacts=contacts, posture=posture)
         self._evaluation = evaluation
         self._signal: SignalState = law.signal.start(evaluation, delay_bound=0.0)
-        self._limit = actuators.torque_limit
         self._plant = LinkPlant(robot, contacts)
         self._places = self._plant.places(self._posture)
         self._scale = max(9.81 * robot.mass, float(np.abs(robot.gravity(posture)).max()), 1e-3)
@@ -129,8 +128,7 @@ class _Search:
             residual = self._residual(q, theta)
             for _ in range(_ROUNDS):
                 if self._small(residual):
-                    springs = self._K * (theta - self._robot.joint_positions(q))
-                    return self._answer(q, theta, self._overload(springs))
+                    return self._answer(q, theta, "")
                 step = self._newton(q, theta, residual)
                 q, theta, residual, better = self._search(q, theta, step, residual)
                 if not better:
@@ -150,7 +148,7 @@ class _Search:
         left[base:] -= carried
         Z = null_space(self._plant.jacobian(q), self._robot.nv)
         balanced = np.abs(Z.T @ left).max(initial=0.0) < _AT_POSTURE * self._scale
-        reason = self._overload(carried) if balanced else self._why()
+        reason = "" if balanced else self._why()
         return Rest(
             q=q,
             theta=joints + self._signal.wound(carried),
@@ -249,18 +247,6 @@ class _Search:
                 "balances, and no posture nearby is balanced"
             )
         return "no balance of springs, gravity and law was found near the posture"
-
-    def _overload(self, springs: Array) -> str:
-        """Which motor cannot give a torque (n,) that springs carry; empty if all can."""
-        torque = np.abs(springs)
-        over = np.flatnonzero(torque > self._limit)
-        if not len(over):
-            return ""
-        i = over[0]
-        return (
-            f"the motor of {self._robot.joints[i]} gives at most {self._limit[i]:g} Nm, and to "
-            f"hold the posture it needs {torque[i]:.3g} Nm"
-        )
 
     def _answer(self, q: Array, theta: Array, reason: str) -> Rest:
         joints = self._robot.joint_positions(q)
