@@ -20,7 +20,6 @@ from sealag.whole_body import (
     GravityCompensation,
     Law,
     LinkAngles,
-    LinkPlant,
     Measurement,
     MotorAngles,
     StaticJoint,
@@ -201,17 +200,15 @@ def test_command_depends_on_motor_angles_alone_where_they_say_where_the_robot_is
 
 @pytest.mark.parametrize("gravity", list(GravityCompensation))
 @pytest.mark.parametrize(("feet", "signal"), [(1, "motor"), (1, "static_joint"), (2, "motor")])
-def test_frozen_loop_contains_the_response_to_passive_motions(feet, signal, gravity):
+def test_derivative_contains_the_response_to_passive_motions(feet, signal, gravity):
     """One point foot leaves three passive motions, two leave one."""
     contacts = ONE_FOOT if feet == 1 else HUME.contacts
     law = {"signal": settling(signal), "gravity": gravity}
     response, Z = response_to_free_motions(HUME, contacts, **law)
-    design = replace(HUME, law=running(HUME, law), contacts=contacts)
-    loop = design.frozen(rest=replace(design.in_posture(), found=True))
-    along = Z.T @ LinkPlant(HUME.robot, contacts).free(HUME.posture, np.zeros(6)).Z
-    np.testing.assert_allclose(
-        loop.C[:, : along.shape[1]], -response @ along, atol=1e-5 * np.abs(response).max()
-    )
+    controller, spaces = build(HUME, contacts, **law), certified(HUME, contacts, **law)
+    theta = without_errors(HUME, controller, spaces).theta
+    found = controller._signal.derivative(HUME.posture, theta).C_q @ Z
+    np.testing.assert_allclose(found, -response, atol=1e-5 * np.abs(response).max())
     assert np.abs(response).max() > 1.0
 
 
