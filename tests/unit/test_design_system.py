@@ -73,6 +73,7 @@ rotor_inertia = 0.06
 motor_damping = 5.0
 [controller]
 feedback = "motor"
+gravity = "feedback"
 stiffness_form = "force"
 [[tasks]]
 name = "joints"
