@@ -80,7 +80,7 @@ def swinging(folder, *, count=40, signal=None, gravity="planned", tasks=None):
     system = arm_system(folder, robot=robot, law=law)
     t = np.linspace(0.0, 2.0, count)
     motion = Motion(
-        time=t, q=np.column_stack([1.5 + 0.3 * np.sin(2 * t), 1.4 - np.cos(3 * t)]),
+        time=t, q=np.column_stack([1.5 + 0.3 * np.sin(2 * t), 0.9 - 0.7 * np.cos(3 * t)]),
         v=np.zeros((count, 2)), contact_sets=((),), contact_index=np.zeros(count, dtype=np.int64),
     )  # fmt: skip
     return system, motion
