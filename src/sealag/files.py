@@ -24,9 +24,11 @@ def read_whole(path: Path, *, what: str, largest: int) -> bytes:
     """
     try:
         with open(path, "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
                 raise FileError(f"{what} {path} is no regular file; give the name of one.")
-            content = file.read(largest + 1)
+            # Not `largest`: Python would make room for all of it before it reads.
+            content = file.read(min(status.st_size or largest, largest) + 1)
     except OSError as error:
         if isinstance(error, FileError):
             raise

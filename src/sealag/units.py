@@ -45,6 +45,23 @@ def time_text(value_s: float | None) -> str:
     return f"{digits} {unit}"
 
 
+def number_of(text: str) -> float | None:
+    """Return the number that a cell of a text file holds; None if it holds none.
+
+    Digits are 0 to 9 and nothing stands between them: Python's own reading takes 0_3 and digits of
+    other scripts for numbers.
+
+    Args:
+        text: the cell.
+    """
+    if not text.isascii() or "_" in text:
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
 def check_delay_s(value_s: float, name: str) -> float:
     """Return a delay in s if it can be one.
 

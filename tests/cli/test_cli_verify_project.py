@@ -19,6 +19,7 @@ BAXTER = ROOT / "examples/baxter.toml"
 def _later(d):
     d["time_s"] = [time + 1.0 for time in d["time_s"]]
     d["worst"]["time_s"] += 1.0
+    d["critical"]["time_s"] += 1.0
 
 
 def _unproven_bound(d):
@@ -28,6 +29,8 @@ def _unproven_bound(d):
 
 
 def _renamed(d):
+    states = d["local_loop"]["states"]
+    d["local_loop"]["states"] = [name.replace(d["joints"][0], "elbow") for name in states]
     d["joints"][0] = "elbow"
     share = d["worst"]["direction"]
     d["worst"]["direction"] = dict(zip(d["joints"], share.values()))

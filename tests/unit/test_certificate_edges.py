@@ -137,6 +137,6 @@ def test_what_the_delay_stands_for_is_said():
     system = standing()
     late = replace(system, delays=replace(system.delays, delayed_torque_feedback=True))
     for design, said in ((system, False), (late, True)):
-        assumptions = " ".join(sealag.certify(design).assumptions)
+        assumptions = " ".join(one.text for one in sealag.certify(design).assumptions)
         assert "count by their sum d_1 alone" in assumptions
         assert ("though the design delays it" in assumptions) is said

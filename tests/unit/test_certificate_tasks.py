@@ -80,7 +80,7 @@ def test_a_certificate_of_two_levels_holds_and_each_level_matters(exact):
 def test_levels_are_kept_apart():
     broken = made("crawl")
     broken["proofs"][0]["stiffness"][0][7] = 1.0
-    assert "couples priority levels" in failures(broken)[0]
+    assert "instant 0: priority levels" in failures(broken)
     broken = made("crawl")
     broken["levels"] = [0, 3, 9]
-    assert failures(broken)[0].startswith("unreadable")
+    assert "`proofs[0].W[0]` has 6 entries where 3 are needed" in failures(broken)[0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sealag.errors import InputError, SolverError
-from sealag.margin import _sweep, delay_margin, delay_margins, random_sea_plant, rightmost_roots
+from sealag.margin import delay_margin, delay_margins, random_sea_plant, rightmost_roots
 
 KNOWN = [
     ([[-2, 0], [0, -0.9]], [[-1, 0], [-1, -1]], math.acos(-0.9) / math.sqrt(0.19)),
@@ -141,34 +141,3 @@ def test_unusable_matrices_are_refused(A_0, A_1) -> None:
 def test_unusable_delay_is_refused(delay: float) -> None:
     with pytest.raises(InputError):
         rightmost_roots([[0]], [[-1]], delay=delay)
-
-
-def test_a_crossing_costs_few_intervals(monkeypatch):
-    """Scalar loops ẋ = −b x − a x(t − d), mixed: ω² = a² − b², cos ωd = −b/a."""
-    rng = np.random.default_rng(5)
-    b, a = np.geomspace(0.01, 10.0, 12), np.geomspace(0.02, 25.0, 12)
-    Q = np.linalg.qr(rng.normal(size=(12, 12)))[0]
-    loop = -Q @ np.diag(b) @ Q.T, -Q @ np.diag(a) @ Q.T
-    counted = []
-    examine = _sweep._examine
-
-    def counting(transfer, lower, upper):
-        counted.append(len(lower))
-        return examine(transfer, lower, upper)
-
-    monkeypatch.setattr(_sweep, "_examine", counting)
-    found = sorted(delay_margin(*loop).crossings, key=lambda crossing: crossing.frequency)
-    omega = np.sqrt(a**2 - b**2)
-    np.testing.assert_allclose([c.frequency for c in found], omega, rtol=1e-9)
-    np.testing.assert_allclose([c.delay for c in found], np.arccos(-b / a) / omega, rtol=1e-9)
-    few = sum(counted)
-    assert few < 40 * len(found)
-    counted.clear()
-
-    def halves(lower, upper, crossing):
-        middle = (lower + upper) / 2.0
-        return np.concatenate([lower, middle]), np.concatenate([middle, upper])
-
-    monkeypatch.setattr(_sweep, "_split", halves)
-    assert len(delay_margin(*loop).crossings) == len(found)
-    assert sum(counted) > 1.5 * few

@@ -139,6 +139,13 @@ def margin(
 def verify(
     certificate: Annotated[Path, typer.Argument(help="Certificate file.")],
     exact: Annotated[bool, typer.Option("--exact", help="Decide in rational arithmetic.")] = False,
+    second: Annotated[
+        bool,
+        typer.Option(
+            "--second",
+            help="Run the second verifier instead: one file of the standard library, all rational.",
+        ),
+    ] = False,
     project: Annotated[
         str | None,
         typer.Option(
@@ -157,7 +164,12 @@ def verify(
 
     raise typer.Exit(
         verify_certificate(
-            certificate, exact=exact, project=project, motion=motion, as_json=as_json
+            certificate,
+            exact=exact,
+            second=second,
+            project=project,
+            motion=motion,
+            as_json=as_json,
         )
     )
 

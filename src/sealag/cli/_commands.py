@@ -9,7 +9,7 @@ from typing import Any
 
 from sealag.cli._app import show_json
 from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
-from sealag.errors import FileError, InputError
+from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import check_output, make_folder, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
@@ -175,12 +175,22 @@ def margin_project(
 
 
 def verify_certificate(
-    path: Path, *, exact: bool, project: str | None, motion: Path | None, as_json: bool
+    path: Path,
+    *,
+    exact: bool,
+    second: bool,
+    project: str | None,
+    motion: Path | None,
+    as_json: bool,
 ) -> int:
     """Check a certificate, against its project if one is given; 1 if it does not hold."""
     from sealag.design import verify_design
     from sealag.passivity import verify
 
+    if second:
+        if exact or project is not None or motion is not None:
+            raise InputError("--second stands alone: it is exact and knows the file only.")
+        return _second(path, as_json=as_json)
     if project is None:
         if motion is not None:
             raise InputError("--motion says nothing without --project.")
@@ -201,6 +211,26 @@ def verify_certificate(
                 print(f"BAD  {check.name}: {check.detail}")
         print("the certificate holds" if result.valid else "the certificate does not hold")
     return 0 if result.valid else 1
+
+
+def _second(path: Path, *, as_json: bool) -> int:
+    """Show what the second verifier decides; 1 if a claim does not hold."""
+    from sealag.second_verifier import claims, read
+
+    found, words = [], {True: "holds", False: "does not hold", None: "cannot decide"}
+    try:
+        for name, holds, detail in claims(read(str(path))):
+            found.append({"name": name, "holds": holds, "detail": detail})
+            if not as_json:
+                print(f"{words[holds]:14} {name}: {detail}".rstrip(": "), flush=True)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise CertificateError(f"{path} is not a certificate: {error}.") from error
+    valid = all(one["holds"] is not False for one in found)
+    if as_json:
+        show_json({"valid": valid, "claims": found})
+    else:
+        print("no claim fails" if valid else "the certificate does not hold")
+    return 0 if valid else 1
 
 
 def write_paper(out: Path, *, as_json: bool) -> None:

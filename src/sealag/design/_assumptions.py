@@ -64,7 +64,8 @@ def _of_stability(motion: Motion, local: Local) -> Iterator[tuple[str, str]]:
         yield (
             "instants_decided",
             f"Stability was decided exactly at {local.count(Basis.EXACT)} of {len(motion)} "
-            f"instants, by the passive bound at {local.count(Basis.BOUND)}, and not at "
+            f"instants, by the passive bound at {local.count(Basis.BOUND)}, by a search for "
+            f"earlier crossings at {local.count(Basis.SEARCHED)}, and not at "
             f"{local.count(Basis.OPEN)}.",
         )
     if local.problem:
@@ -75,8 +76,8 @@ def _of_delays(system: System) -> Iterator[tuple[str, str]]:
     delays = system.delays
     yield (
         "delay_bound",
-        f"d_1 is at most {time_text(delays.d_1)}; it may vary below that (order, phase, frequency "
-        "and table of the delays act in simulation only).",
+        f"d_1 is at most {time_text(delays.d_1)}; it may vary below that as it likes (order, "
+        "phase_rad, angular_frequency_rad_s, time_s and period_s of the delays shape a run only).",
     )
     ways = {
         "central_up": delays.central.up,
@@ -165,14 +166,11 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
 
 def _of_contacts(system: System) -> Iterator[tuple[str, str]]:
     if system.contacts:
-        yield (
-            "contacts",
-            "Contacts neither slip nor lift off (friction, foot_radius, foot_half_length, "
-            "foot_half_width, torsional_damping and torsional_radius act in simulation only).",
-        )
+        yield "contacts", "Contacts neither slip nor lift off."
     yield (
         "simulation",
-        "What [simulation] says (scenario, duration_s, physics_step_ms, pushes with frame, "
-        "force_n, start_s and duration_s, drop_height, track_amplitude, track_frequency_hz, seed, and the "
-        "ground and feet) sets a run, not the loop.",
+        "What [simulation] says sets a run, not the loop: scenario, duration_s, physics_step_ms, "
+        "seed, pushes (frame, force_n, start_s, duration_s), drop_height, track_amplitude, "
+        "track_frequency_hz, and of the feet friction, foot_radius, foot_half_length, "
+        "foot_half_width, torsional_damping and torsional_radius.",
     )

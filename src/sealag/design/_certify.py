@@ -15,8 +15,10 @@ from sealag.design._evidence import (
     common_multiplier,
     instant_proofs,
     moving_multiplier,
+    refuted_delay,
     stated_loop,
     without,
+    without_bounds,
     worst_motion,
 )
 from sealag.design._local import Local, local_of
@@ -34,6 +36,7 @@ from sealag.passivity import (
 from sealag.robot import Motion
 from sealag.typing import Array
 from sealag.units import time_text
+from sealag.whole_body import Rest as Equilibrium
 from sealag.whole_body import Spaces
 
 PROOF_COUNT = 12
@@ -101,10 +104,17 @@ def certify(
     )
     if missing:
         bounds, common, moving = without(bounds, missing), None, None
-    local = local_of(system, motion, spaces, passive)
+    decided = passive if kind is Criterion.CERTIFIED else without_bounds(passive)
+    local = local_of(system, motion, spaces, decided)
     return Certificate(
         **_answer(
-            system, spaces, bounds, kind=kind, local=local, open_=_left_open(system, common, moving)
+            system,
+            spaces,
+            bounds,
+            kind=kind,
+            local=local,
+            rest=rest,
+            open_=_left_open(system, common, moving),
         ),
         **_at_worst(system, motion, bounds, local),
         **_over_motion(motion, local),
@@ -199,6 +209,7 @@ def _answer(
     *,
     kind: Criterion,
     local: Local,
+    rest: Equilibrium | None,
     open_: tuple[str, ...],
 ) -> dict[str, Any]:
     """Status with its reasons, and what decides it."""
@@ -212,13 +223,14 @@ def _answer(
             f"{time_text(max_delay_s)}{solver}"
         )
     reasons += open_
+    if rest is not None and not rest.found:
+        reasons.append(f"the loop that holds the posture has no equilibrium: {rest.reason}")
     if kind is Criterion.CERTIFIED and not reasons:
         reasons += _undercut(local, bounds.delay)
     return {
         "status": Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
         "criterion": kind,
         "max_delay_s": max_delay_s,
-        "max_delay_upper_s": float(bounds.upper[worst]),
         "asymmetry": _finite(np.max(asymmetry(spaces, bounds, kind))),
         "contraction": _finite(spaces.contraction.max()),
         "reasons": tuple(reasons),
@@ -243,7 +255,9 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
     worst = int(np.argmin(bounds.delay))
     y = worst_motion(system, bounds, worst)
     power = system.actuators.motor_damping * np.abs(y) ** 2
-    margin, bound = local.margin_s, float(bounds.delay[worst])
+    margin, bound, upper = local.margin_s, float(bounds.delay[worst]), float(bounds.upper[worst])
+    if 0.0 < bound < np.inf:
+        upper = float(refuted_delay(system, bounds, worst, y)) * (1.0 + 1e-13)
     known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
     return {
         "worst": Worst(
@@ -251,6 +265,7 @@ def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> d
             time_s=float(motion.time[worst]),
             direction=dict(zip(system.robot.joints, (power / power.sum()).tolist(), strict=True)),
         ),
+        "max_delay_upper_s": upper,
         "worst_motion": [y.real.tolist(), y.imag.tolist()],
         "conservatism": margin / bound if margin is not None and known else None,
     }

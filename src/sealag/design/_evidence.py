@@ -142,9 +142,27 @@ def worst_motion(system: System, bounds: Bounds, instant: int) -> Array:
         instant: the worst one.
     """
     root = 1.0 / np.sqrt(system.actuators.motor_damping)
-    A, phi = root[:, None] * bounds.F[instant] * root, bounds.angle[instant]
-    H = np.cos(phi) * (A + A.T) / 2.0 + 0.5j * np.sin(phi) * (A - A.T)
-    return root * np.linalg.eigh(H)[1][:, -1]
+    A, phi = root[:, None] * bounds.F[instant] * root, float(bounds.angle[instant])
+    for _ in range(100):
+        H = np.cos(phi) * (A + A.T) / 2.0 + 0.5j * np.sin(phi) * (A - A.T)
+        x = np.linalg.eigh(H)[1][:, -1]
+        before, phi = phi, -float(np.angle(x.conj() @ A @ x))
+        if abs(phi - before) <= 1e-14:
+            break
+    return root * x
+
+
+def refuted_delay(system: System, bounds: Bounds, instant: int, motion: Array) -> float:
+    """Delay above which a motion turns the delayed loop active, y* D_θ y / |y* F y|, s.
+
+    Args:
+        system: the design.
+        bounds: of the criterion.
+        instant: the worst one.
+        motion: (n,) complex motor velocities y.
+    """
+    power = float(system.actuators.motor_damping @ np.abs(motion) ** 2)
+    return power / max(abs(motion.conj() @ bounds.F[instant] @ motion), 1e-300)
 
 
 def stated_loop(loop: FrozenLoop, margin: DelayMargin | None) -> LocalLoop:
@@ -201,6 +219,16 @@ def instant_proofs(
         except SolverError as error:
             missing[k] = str(error)
     return tuple(proofs), missing
+
+
+def without_bounds(bounds: Bounds) -> Bounds:
+    """Return the same with no bound at any instant, as under the published criterion, whose bounds
+    decide no stability.
+
+    Args:
+        bounds: of the certified criterion.
+    """
+    return replace(bounds, delay=np.zeros_like(bounds.delay))
 
 
 def without(bounds: Bounds, missing: dict[int, str]) -> Bounds:

@@ -11,13 +11,13 @@ from sealag.margin import DelayMargin, delay_margin
 from sealag.passivity import Basis
 from sealag.robot import Motion
 from sealag.typing import Array
-from sealag.whole_body import FrozenLoop, LinkPlant, Rest, Spaces
+from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, Spaces, sea_loop
 
 MOST_EXACT = 600
 """Instants of a motion that are decided exactly at most; a bound decides the others, or none."""
 
 _FEW = 50  # instants up to which all are decided, also once one is known to be unstable
-_AT_REST = 1e-9  # share of weight and torques that springs and contacts may leave over at a posture
+_AT_REST = 1e-7  # share of weight and torques that springs and contacts may leave over at a posture
 _MINIMUM = 1e-9  # share of the largest curvature above which a potential has a strict minimum
 
 
@@ -74,15 +74,9 @@ class Local:
 
     @property
     def margin_s(self) -> float | None:
-        """Smallest margin over the motion, s; None unless every instant was decided, or one is
-        unstable."""
+        """Smallest margin of the instants that were decided exactly, s; None if there is none."""
         exact = [one.delay for one in self.instants if one.basis is Basis.EXACT]
-        least = min(exact, default=np.inf)
-        if least == 0.0:
-            return 0.0
-        open_ = any(one.basis is Basis.OPEN for one in self.instants)
-        below = any(one.basis is Basis.BOUND and one.delay < least for one in self.instants)
-        return None if open_ or below or not exact else least
+        return min(exact, default=None)
 
     @property
     def first_crossing_s(self) -> float | None:
@@ -155,24 +149,22 @@ class _Decision:
     def __init__(self, system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> None:
         self._system, self._motion, self._spaces, self._bounds = system, motion, spaces, bounds
         self._found: list[InstantMargin] = [OPEN] * len(motion)
-        self._best: tuple[DelayMargin | None, FrozenLoop | None, Rest | None, str, int] | None = (
-            None
-        )
-        self._exact = 0
+        self._best: _Known | None = None
+        self._critical = 0
 
     def run(self) -> Local:
         count = len(self._motion)
-        bounded = self._bounded() if count > 1 else np.zeros(count, dtype=bool)
-        for k in _spread(np.flatnonzero(~bounded), MOST_EXACT):
+        minima = self._minima() if count > 1 else {}
+        for k in _spread(np.array([k for k in range(count) if k not in minima]), MOST_EXACT):
             if self._decide(int(k)) and count > _FEW:
                 break
-        for k in np.flatnonzero(bounded):
+        for k in minima:
             delay = float(self._bounds.delay[k])
             self._found[k] = InstantMargin(basis=Basis.BOUND, delay=delay)
-        for k in np.argsort(np.where(bounded, self._bounds.delay, np.inf), kind="stable"):
-            if not bounded[k] or self._bounds.delay[k] >= self._least() or self._exact > MOST_EXACT:
+        for k in sorted(minima, key=lambda at: float(self._bounds.delay[at])):
+            if self._bounds.delay[k] >= self._least():
                 break
-            self._decide(int(k))
+            self._search(k, minima[k])
         assert self._best is not None
         return Local(
             instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
@@ -180,16 +172,38 @@ class _Decision:
         )  # fmt: skip
 
     def _least(self) -> float:
-        exact = [one.delay for one in self._found if one.basis is Basis.EXACT]
-        return min(exact, default=np.inf)
+        return np.inf if self._best is None or self._best.delay is None else self._best.delay
+
+    def _search(self, k: int, links: FreeLinks) -> None:
+        """Look for crossings of a loop at a minimum that come before the smallest margin known."""
+        least, robot = self._least(), self._system.robot
+        loop = sea_loop(
+            self._system.actuators,
+            M=links.M,
+            H=links.H,
+            S=links.Z[robot.nv_base :],
+            C_z=np.zeros((robot.n, links.Z.shape[1])),
+            C_theta=-self._spaces.F_theta[k],
+            joint_damping=robot.damping,
+        )
+        try:
+            margin = margin_of(loop, at_most=None if np.isinf(least) else least)
+        except SolverError:
+            self._found[k] = OPEN
+            return
+        if margin.delay < least or np.isinf(least):
+            self._found[k] = InstantMargin(basis=Basis.EXACT, delay=float(margin.delay))
+            rest = self._system.in_posture(self._motion, k)
+            self._best = _Known(margin=margin, loop=loop, rest=rest, problem="")
+            self._critical = k
+        else:
+            self._found[k] = InstantMargin(basis=Basis.SEARCHED, delay=least)
 
     def _decide(self, k: int) -> bool:
         """Decide an instant exactly; return whether it is unstable without delay."""
-        self._exact += 1
-        rest = self._system.rest(self._motion, k)
-        states = [rest]
-        if not (self._system.law.rests_at_posture and rest.found):
-            states.append(self._system.in_posture(self._motion, k))
+        states = [self._system.in_posture(self._motion, k)]
+        if not (self._system.law.rests_at_posture and states[0].found):
+            states.append(self._system.rest(self._motion, k))
         worst = min((self._at(k, state) for state in states), key=_Known.order)
         unstable = worst.delay == 0.0
         if worst.delay is not None:
@@ -210,20 +224,23 @@ class _Decision:
             problem = problem or str(error)
         return _Known(margin=margin, loop=loop, rest=state, problem=problem)
 
-    def _bounded(self) -> Array:
-        """Instants (N,) at which a potential decides: stable, with a margin above the bound."""
+    def _minima(self) -> dict[int, FreeLinks]:
+        """Links at the instants that a potential decides: stable, with a margin above the bound."""
         system, spaces = self._system, self._spaces
         good = (self._bounds.delay > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
         if not (system.law.rests_at_posture and system.ideal_drives):
-            return np.zeros(len(good), dtype=bool)
+            return {}
         plants = [LinkPlant(system.robot, contacts) for contacts in self._motion.contact_sets]
-        for k in np.flatnonzero(good):
-            plant = plants[self._motion.contact_index[k]]
-            good[k] = self._at_minimum(plant, int(k))
-        return good
+        found = {}
+        for k in np.flatnonzero(good).tolist():
+            links = self._minimum(plants[self._motion.contact_index[k]], k)
+            if links is not None:
+                found[k] = links
+        return found
 
-    def _at_minimum(self, plant: LinkPlant, k: int) -> bool:
-        """Whether the loop rests at the instant, in a strict minimum of the whole potential."""
+    def _minimum(self, plant: LinkPlant, k: int) -> FreeLinks | None:
+        """Links where the loop rests at the instant, in a strict minimum of the whole potential,
+        and joints determine all motions, so that the command is −F_θ δθ alone; else None."""
         system, q, springs = self._system, self._motion.q[k], self._spaces.gravity[k]
         links = plant.free(q, springs)
         S, K = links.Z[system.robot.nv_base :], np.diag(system.actuators.spring_stiffness)
@@ -231,13 +248,13 @@ class _Decision:
         force[system.robot.nv_base :] -= springs
         weight = max(9.81 * system.robot.mass, float(np.abs(springs).max(initial=0.0)))
         if np.abs(links.Z.T @ force).max(initial=0.0) > _AT_REST * weight:
-            return False
+            return None
         if np.linalg.matrix_rank(S) < S.shape[1]:
-            return False
+            return None
         F = self._spaces.F_theta[k]
         hessian = np.block([[links.H + S.T @ K @ S, -S.T @ K], [-K @ S, K + (F + F.T) / 2.0]])
         values = np.linalg.eigvalsh(hessian)
-        return bool(values[0] > _MINIMUM * values[-1])
+        return links if values[0] > _MINIMUM * values[-1] else None
 
 
 def margin_of(loop: FrozenLoop, **choices: object) -> DelayMargin:

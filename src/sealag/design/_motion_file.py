@@ -13,6 +13,7 @@ from sealag.errors import InputError, MotionError
 from sealag.files import read_whole, written_whole
 from sealag.robot import UNIT_TOLERANCE, Contact, Motion, Robot, require_within_limits
 from sealag.typing import Array
+from sealag.units import number_of
 
 BASE_COLUMNS = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 BASE_RATES = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
@@ -159,7 +160,7 @@ def _read_parquet(content: bytes, path: Path) -> dict[str, Array]:
 def _read_csv(content: bytes, path: Path) -> dict[str, Array]:
     lines = csv.reader(content.decode("utf-8-sig").splitlines(), strict=True)
     names = [name.strip() for name in next(lines, [])]
-    if not names or _number(names[0]) is not None:
+    if not names or number_of(names[0]) is not None:
         raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
     if ";" in names[0]:
         raise MotionError(f"{path} has semicolons between its cells; commas are right.")
@@ -170,7 +171,7 @@ def _read_csv(content: bytes, path: Path) -> dict[str, Array]:
     for cells in lines:
         if not cells:
             continue
-        numbers = [_number(cell) for cell in cells]
+        numbers = [number_of(cell) for cell in cells]
         if len(cells) != len(names):
             raise MotionError(
                 f"{path}: row {len(rows) + 1} has {len(cells)} cells, but there are {len(names)} "
@@ -185,13 +186,6 @@ def _read_csv(content: bytes, path: Path) -> dict[str, Array]:
         rows.append([number for number in numbers if number is not None])
     columns = np.array(rows, dtype=float).reshape(-1, len(names)).T
     return dict(zip(names, columns, strict=True))
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
 
 
 _READERS = {".csv": _read_csv, ".npz": _read_npz, ".parquet": _read_parquet}

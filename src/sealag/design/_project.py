@@ -22,7 +22,7 @@ from sealag.delay import (
     measured,
 )
 from sealag.design._plain_words import first_problem
-from sealag.design._schema import Project, SamplesDelay
+from sealag.design._schema import AXES, Project, SamplesDelay
 from sealag.design._system import Source, System
 from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
@@ -38,11 +38,11 @@ from sealag.robot import (
     resolve_urdf,
 )
 from sealag.typing import Array
+from sealag.units import number_of
 from sealag.whole_body import Law, Signal, Tank, TankFlow, Task, TaskKind, signal_named
 
 LARGEST_PROJECT_BYTES = 1_000_000
 LARGEST_SAMPLES_BYTES = 50_000_000
-_AXES = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
 _REQUIRED = ("spring_stiffness", "rotor_inertia", "motor_damping", "inertia_shaping")
 
 
@@ -217,7 +217,7 @@ def _posture(section: Any, robot: Robot, path: Path) -> Array:
 
 
 def _task(section: Any) -> Task:
-    axes = tuple(_AXES[axis] for axis in section.axes)
+    axes = tuple(AXES.index(axis) for axis in section.axes)
     if section.kind == "orientation":
         axes = tuple(axis - 3 if axis >= 3 else axis for axis in axes)
     return Task(
@@ -342,12 +342,12 @@ def _samples(section: Any, folder: Path) -> DelaySignal:
     content = read_whole(path, what="The delay samples", largest=LARGEST_SAMPLES_BYTES)
     values = []
     for row, line in enumerate(content.decode("utf-8-sig", "replace").splitlines(), start=1):
-        try:
-            values += [float(line)] if line.strip() else []
-        except ValueError as error:
+        value = number_of(line)
+        if value is None and line.strip():
             raise ProjectError(
                 f"{path}: line {row} is {line.strip()[:60]!r}; one number, a delay in ms, is right."
-            ) from error
+            )
+        values += [] if value is None else [value]
     if not values:
         raise ProjectError(f"{path} is empty; one delay in ms a line is needed.")
     return measured(np.array(values) * 1e-3, period=section.period_s, quantile=section.quantile)

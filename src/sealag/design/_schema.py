@@ -4,6 +4,7 @@ Ranges are generous, but physical: what lies outside is a slip of the pen or a m
 would overflow or leave the numerics without an answer.
 """
 
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -16,6 +17,25 @@ from pydantic import (
     Tag,
 )
 from pydantic_core import PydanticCustomError
+
+from sealag.delay import PacketOrder
+from sealag.passivity import Criterion
+from sealag.robot import ContactKind
+from sealag.whole_body import (
+    SIGNAL_NAMES,
+    GravityCompensation,
+    StiffnessForm,
+    TankFlow,
+    TaskError,
+    TaskInertia,
+    TaskKind,
+)
+
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+"""The rows of a pose: position, then rotation."""
+
+SCENARIOS = ("regulate", "track", "drop", "balance", "walk")
+"""What `sealag simulate` can run."""
 
 
 def _within(low: float, high: float, unit: str = "", *, or_zero: bool = False) -> AfterValidator:
@@ -46,6 +66,19 @@ Rate = Annotated[FiniteFloat, _within(1e-6, 1e7, "rad/s")]
 Gain = Annotated[FiniteFloat, _within(1e-6, 1e9, "1/s²", or_zero=True)]
 Duration = Annotated[FiniteFloat, _within(1e-6, 1e6, "s")]
 Seed = Annotated[int, Field(ge=0)]
+
+
+def _one_of(words: Iterable[str]) -> AfterValidator:
+    """Refuse words that are not among those that the code itself knows."""
+    known = [str(word) for word in words]
+    need = "it must be " + " or ".join([", ".join(map(repr, known[:-1])), repr(known[-1])])
+
+    def check(value: str) -> str:
+        if value in known:
+            return value
+        raise PydanticCustomError("range", "{need}", {"need": need})
+
+    return AfterValidator(check)
 
 
 def _by_shape(value: Any) -> str:
@@ -105,19 +138,19 @@ class ContactSection(Section):
     """[[contacts]]"""
 
     frame: str
-    kind: Literal["point", "surface"] = "point"
+    kind: Annotated[str, _one_of(ContactKind)] = ContactKind.POINT.value
 
 
 class ControllerSection(Section):
     """[controller]"""
 
-    feedback: Literal["motor", "static_joint", "static_joint_tank", "joint"]
-    gravity: Literal["feedback", "planned", "none"]
-    stiffness_form: Literal["symmetric", "published", "force"] = "symmetric"
-    task_inertia: Literal["lambda_ts", "lambda_star"] = "lambda_ts"
-    task_error: Literal["consistent", "plain"] = "consistent"
-    criterion: Literal["certified", "published"] = "certified"
-    tank_flow: Literal["corrected", "published"] = "corrected"
+    feedback: Annotated[str, _one_of(SIGNAL_NAMES)]
+    gravity: Annotated[str, _one_of(GravityCompensation)]
+    stiffness_form: Annotated[str, _one_of(StiffnessForm)] = StiffnessForm.SYMMETRIC.value
+    task_inertia: Annotated[str, _one_of(TaskInertia)] = TaskInertia.LAMBDA_TS.value
+    task_error: Annotated[str, _one_of(TaskError)] = TaskError.CONSISTENT.value
+    criterion: Annotated[str, _one_of(Criterion)] = Criterion.CERTIFIED.value
+    tank_flow: Annotated[str, _one_of(TankFlow)] = TankFlow.CORRECTED.value
     tank_energy_j: Annotated[FiniteFloat, _within(0, 1e9, "J")] = 1.0
     tank_rate: Annotated[FiniteFloat, _within(0, 1e6, "1/s")] = 5.0
 
@@ -126,14 +159,14 @@ class TaskSection(Section):
     """[[tasks]]"""
 
     name: str
-    kind: Literal["com", "position", "orientation", "pose", "posture"]
+    kind: Annotated[str, _one_of(TaskKind)]
     stiffness: Annotated[
         Annotated[Gain, Tag("number")] | Annotated[list[Gain], Tag("list")],
         Discriminator(_by_shape),
     ]
     frame: str | None = None
     joints: list[str] = []
-    axes: list[Literal["x", "y", "z", "rx", "ry", "rz"]] = []
+    axes: list[Annotated[str, _one_of(AXES)]] = []
     priority: Annotated[int, Field(ge=1)] = 1
 
 
@@ -143,7 +176,7 @@ class DelayTable(Section):
     jitter_ms: Milliseconds = 0.0
     packet_loss: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
     max_burst: Annotated[int, Field(ge=1)] = 10
-    order: Literal["fifo", "newest", "arrival"] = "fifo"
+    order: Annotated[str, _one_of(PacketOrder)] = PacketOrder.FIFO.value
 
 
 class ConstantDelay(DelayTable):
@@ -264,7 +297,7 @@ class WalkingSection(Section):
 class SimulationSection(Section):
     """[simulation]: how `sealag simulate` runs the design"""
 
-    scenario: Literal["regulate", "track", "drop", "balance", "walk"] = "regulate"
+    scenario: Annotated[str, _one_of(SCENARIOS)] = SCENARIOS[0]
     duration_s: Duration = 2.0
     physics_step_ms: Annotated[FiniteFloat, _within(1e-3, 10, "ms")] | None = None
     friction: Friction = 0.8

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sealag.design._criteria import certified_bounds
+from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
 from sealag.design._walking import Walking
 from sealag.errors import InputError, either
@@ -31,7 +32,6 @@ from sealag.simulation import (
 from sealag.typing import Array
 from sealag.whole_body import Controller, TaskKind, TickController
 
-SCENARIOS = ("regulate", "track", "drop", "balance", "walk")
 LONGEST_STEP = 1e-3
 """Longest physics step, s."""
 SHORTEST_STEP = 1e-5

@@ -197,14 +197,15 @@ def gravity_slope(tree, terms, along, H, work, out):
 
 
 @njit(cache=True)
-def static_step(J_star, stiffness, slope, K, torque, sag, work, step):
+def static_step(J_star, moved, stiffness, slope, K, torque, sag, work, step):
     """One Newton step towards K (θ − q̄) = l(q̄), Eqs. (15), (16), with sag = q̄ − θ.
 
-    (K − J*ᵀ S J* + ∂ḡ/∂q) δ = −K sag − l by elimination; then sag ← sag + δ. Where the fixed point
-    is a contraction every pivot is positive.
+    (K − J*ᵀ S J + ∂ḡ/∂q) δ = −K sag − l by elimination, −J the errors' Jacobian; then
+    sag ← sag + δ. Where the fixed point is a contraction every pivot is positive.
 
     Args:
         J_star: (m, n).
+        moved: (m, n) J: J* itself where lower tasks leave errors to higher ones.
         stiffness: (m, m) S.
         slope: (n, n) ∂ḡ/∂q of the gravity compensation, 0 if it is not fed back.
         K: (n,) spring stiffness.
@@ -225,7 +226,7 @@ def static_step(J_star, stiffness, slope, K, torque, sag, work, step):
                 for i in range(n):
                     factor = entry * J_star[r, i]
                     for j in range(n):
-                        work[i, j] -= factor * J_star[s, j]
+                        work[i, j] -= factor * moved[s, j]
     for i in range(n):
         work[i, i] += K[i]
         step[i] = -K[i] * sag[i] - torque[i]
@@ -249,7 +250,7 @@ def warm() -> None:
     """Compile every kernel of this module."""
     leave_to_higher(np.zeros((1, 2)), np.zeros((1, 2)), np.array([0, 1]), np.zeros(1), np.zeros(2))
     J, S, K = np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1)
-    static_step(J, S, J, K, np.zeros(1), np.zeros(1), np.zeros((1, 1)), np.zeros(1))
+    static_step(J, J, S, J, K, np.zeros(1), np.zeros(1), np.zeros((1, 1)), np.zeros(1))
     nv, c, m = 7, 3, 1
     (tree, terms), one, row = dynamics.example(nv), np.zeros(1), np.zeros((1, 3), np.int64)
     mounts = np.ones(1, np.int64), np.eye(3)[None], np.zeros((1, 3)), np.ones((1, nv), np.int64)

@@ -116,19 +116,18 @@ def _in_passage(picture: Picture, part: Passage, curve: Curve) -> Found:
             return _at_rest(picture, part, curve)
         if curve.offset < 0.0:
             return Found([], explained=True, decided=True)
-    offset = curve.offset if family.centre <= part.lower or not curve.even else -curve.offset
-    inside = part.lower <= family.centre + offset <= part.upper
-    start = min(max(family.centre + offset, part.lower), part.upper)
+    mirrored = curve.even and family.centre > part.lower
+    signs = [_side(picture, part, curve, at) for at in (part.lower, part.upper)]
+    if signs[0] * signs[1] > 0.0:
+        return Found([], explained=True, decided=True)
+    start = family.centre + (-curve.offset if mirrored else curve.offset)
+    start = min(max(start, part.lower), part.upper)
     expected = value + (start - family.centre) * family.motion[k, k]
     phi, omega = picture.place(start, complex(1j * expected.imag))
     point = _newton(picture.loop, phi, omega, left=family.left[k], right=family.right[:, k])
     if point is not None and _belongs(picture, part, curve, point):
         return _reported(picture.loop, point, touching=False)
-    signs = [_side(picture, part, curve, at) for at in (part.lower, part.upper)]
-    if curve.even:
-        signs[0 if family.centre <= part.lower else 1] = math.copysign(1.0, value.real)
-    absent = signs[0] * signs[1] > 0.0
-    return Found([], explained=absent, decided=absent or not inside)
+    return Found([], explained=False, decided=False)
 
 
 def _belongs(picture: Picture, part: Passage, curve: Curve, point: _Point) -> bool:
@@ -146,10 +145,14 @@ def _belongs(picture: Picture, part: Passage, curve: Curve, point: _Point) -> bo
 def _side(picture: Picture, part: Passage, curve: Curve, at: float) -> float:
     """On which side of the axis the curve is at an end of its part; 0 where it cannot be told."""
     family, k = part.family, curve.index
+    if curve.even and at == family.centre:
+        return math.copysign(1.0, family.values[k].real)
+    along = family.values[k] + (at - family.centre) * family.motion[k, k]
+    if not curve.even and abs(along.real) > curve.reach:
+        return math.copysign(1.0, along.real)
     other = picture.family(at)
     if other is None:
         return 0.0
-    along = family.values[k] + (at - family.centre) * family.motion[k, k]
     nearest = int(np.abs(other.values - along).argmin())
     value = other.values[nearest].real
     return math.copysign(1.0, value) if abs(value) > other.blur[nearest, nearest] else 0.0
@@ -197,7 +200,10 @@ def _in_band(picture: Picture, band: Band) -> Found:
     rates = np.abs(np.diagonal(family.motion).real)
     room = 4.0 * (np.diagonal(family.blur) + 2.0 * half * rates)
     room = np.maximum(room, _ON_AXIS * np.abs(np.diagonal(family.motion)) * max(half, 1e-8))
-    near = np.flatnonzero(np.abs(family.values.real) <= room)
+    close = np.abs(family.values.real) <= room
+    if band.end:
+        close &= family.values.imag >= 0.0  # the conjugate is the mirror image
+    near = np.flatnonzero(close)
     found: list[Crossing] = []
     explained, decided = bool(len(near)), True
     for k in near:

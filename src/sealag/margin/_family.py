@@ -18,6 +18,8 @@ from sealag.typing import Array
 _LINEAR = 2.0
 _EVEN = 8.0
 _NEAR = 1.5
+_DISC = 0.3
+_MOST_DISCS = 8
 
 
 class Window(NamedTuple):
@@ -43,15 +45,15 @@ class Curve(NamedTuple):
         offset: where it is expected on the axis, Δ.
         even: whether its real part is even in Δ and it is real for Δ = 0.
         bend: b of Re λ = m + b Δ² + … where it is even; 0 otherwise.
-        radius: of the disc about Λ_k + (M − Λ)_kk that holds it and no other, 1/s or none.
-        reach: bound of its distance from Λ_k + Δ (M_1)_kk, in the same unit.
+        alone: radius of a disc about it, moving with M_kk, that holds no other eigenvalue.
+        reach: bound of its distance from Λ_k + Δ (M_1)_kk.
     """
 
     index: int
     offset: float
     even: bool
     bend: float
-    radius: float
+    alone: float
     reach: float
 
 
@@ -85,7 +87,7 @@ class Family:
 
     def excluded(self, h: float, window: Window) -> bool:
         """Whether no eigenvalue is on the window for |Δ| ≤ h."""
-        return self._clear(self._gap(h, window), h)
+        return self._none_on_axis(self._gap(h, window), h)
 
     def curves(self, h: float, window: Window) -> list[Curve] | None:
         """Eigenvalues that alone can be on the window for |Δ| ≤ h, each at most once; else None.
@@ -104,11 +106,9 @@ class Family:
             curve = self._curve(int(k), h)
             if curve is None:
                 return None
-            gap[k] = curve.radius
+            gap[k] = curve.alone
             found.append(curve)
-        if len(found) > 1 and not self._disjoint(found, h):
-            return None
-        return found if self._clear(gap, h) else None
+        return found if self._none_on_axis(gap, h) else None
 
     def blurred(self, h: float) -> bool:
         """Whether rounding hides on which side the nearest eigenvalue is, and to split is vain."""
@@ -116,6 +116,11 @@ class Family:
         rounding = self.blur[k, k]
         moved = h * abs(self._rates[k].real) + self.remainder(h) * self.rest[k, k]
         return bool(abs(self.values[k].real) <= 4.0 * rounding and moved <= rounding)
+
+    @property
+    def rests(self) -> bool:
+        """Whether the eigenvalue nearest to the axis is one of a real matrix and real itself."""
+        return self.real and self.values[np.abs(self.values.real).argmin()].imag == 0.0
 
     @property
     def _rates(self) -> Array:
@@ -130,6 +135,38 @@ class Family:
             outside = np.maximum(np.minimum(window.above - imag, imag - window.below), 0.0)
             gap = np.maximum(gap, np.hypot(real, outside) - h * np.abs(self._rates))
         return gap - slack
+
+    def _none_on_axis(self, D: Array, h: float) -> bool:
+        """Whether no eigenvalue is on the window, where D are their distances to what counts of it.
+
+        A point of the axis is near one eigenvalue at most: where two of them are near the axis,
+        the discs about each are looked at one by one, and the rest of the axis outside the discs.
+        """
+        if self._clear(D, h):
+            return True
+        if not (D > 0.0).all() or not np.isfinite(self.remainder(h)):
+            return False
+        apart = self._apart(h)
+        same = apart <= _DISC**-2 * np.maximum(D[:, None], D)  # equal joints: looked at together
+        radius = _DISC * np.where(same, np.inf, apart).min(axis=1)
+        radius = np.minimum(radius, 1e300)
+        near = np.minimum(radius, h * np.abs(self.motion).max(axis=1)) > D
+        if not 2 <= near.sum() <= _MOST_DISCS or not self._clear(np.where(near, radius, D), h):
+            return False
+        for k in np.flatnonzero(near):
+            inside = np.where(same[k], D, np.maximum(D, apart[k] - radius[k]))
+            inside[k] = D[k]
+            if not self._clear(inside, h):
+                return False
+        return True
+
+    def _apart(self, h: float) -> Array:
+        """(n, n) distances that the uncoupled eigenvalues keep from each other for |Δ| ≤ h."""
+        slack = self.remainder(h) * np.diagonal(self.rest) + np.diagonal(self.blur)
+        apart = np.abs(self.values[:, None] - self.values)
+        apart -= h * np.abs(self._rates[:, None] - self._rates) + slack + slack[:, None]
+        np.fill_diagonal(apart, np.inf)
+        return apart
 
     def _clear(self, D: Array, h: float) -> bool:
         """Whether ‖D^{-½} (h M_1 + s S + F) D^{-½}‖ < 1 without the diagonal."""
@@ -155,11 +192,8 @@ class Family:
         if self.real and value.imag == 0.0:
             return self._even_curve(k, h)
         R = _LINEAR * h
-        radius, reach = self._isolated(k, R, reach=0.98 * (R - h) * abs(rate.real))
-        if not radius:
-            return None
-        offset = float(-value.real / rate.real)
-        return Curve(k, offset, even=False, bend=0.0, radius=radius, reach=reach)
+        curve = self._isolated(k, R, reach=0.98 * (R - h) * abs(rate.real))
+        return curve and curve._replace(offset=float(-value.real / rate.real))
 
     def _even_curve(self, k: int, h: float) -> Curve | None:
         """A real eigenvalue of a real matrix: Re λ = m + b Δ² + …, with |c_2j| ≤ ρ/R^{2j}."""
@@ -171,39 +205,32 @@ class Family:
         bend = float((self.bend[k] + second).real)
         tail = 1.0 / (1.0 - _EVEN**-2) ** 2 - 1.0
         R = _EVEN * h
-        radius, reach = self._isolated(k, R, reach=0.9 * abs(bend) * R**2 / tail)
-        if not radius:
-            return None
-        square = -float(self.values[k].real) / bend
+        curve = self._isolated(k, R, reach=0.9 * abs(bend) * R**2 / tail)
+        square = -float(self.values[k].real) / bend if bend else 0.0
         offset = float(np.copysign(np.sqrt(abs(square)), square))
-        return Curve(k, offset, even=True, bend=bend, radius=radius, reach=reach)
+        return curve and curve._replace(offset=offset, even=True, bend=bend)
 
-    def _isolated(self, k: int, R: float, *, reach: float) -> tuple[float, float]:
-        """Radius of a disc that holds eigenvalue k alone for complex |Δ| ≤ R, and its reach.
-
-        The radius is 0 where none is found within the reach that is asked for.
+    def _isolated(self, k: int, R: float, *, reach: float) -> Curve | None:
+        """Two discs about eigenvalue k for complex |Δ| ≤ R: in the larger one none is but k, and k
+        is in the smaller one, which keeps it within reach of its tangent; None if there are none.
         """
         s = self.remainder(R)
         if not np.isfinite(s):
-            return 0.0, 0.0
+            return None
         slack = s * np.diagonal(self.rest) + np.diagonal(self.blur)
         D = np.abs(self.values - self.values[k]) - R * np.abs(self._rates - self._rates[k])
         D = D - slack - slack[k]
         D[k] = np.inf
-        radius = float(min(reach - slack[k], 0.5 * D.min()))
+        alone = min(_DISC * float(D.min()), 1e300)
+        radius = min(reach - float(slack[k]), alone)
         if radius <= 0.0:
-            return 0.0, 0.0
-        D = D - radius
+            return None
+        D = D - alone
         D[k] = radius
-        return (radius, radius + float(slack[k])) if self._clear(D, R) else (0.0, 0.0)
-
-    def _disjoint(self, curves: list[Curve], h: float) -> bool:
-        at = [curve.index for curve in curves]
-        reach = np.array([curve.reach for curve in curves])
-        apart = np.abs(self.values[at][:, None] - self.values[at])
-        apart -= h * np.abs(self._rates[at][:, None] - self._rates[at])
-        np.fill_diagonal(apart, np.inf)
-        return bool((apart > reach[:, None] + reach).all())
+        if not self._clear(D, R):
+            return None
+        reach = radius + float(slack[k])
+        return Curve(k, 0.0, even=False, bend=0.0, alone=alone, reach=reach)
 
 
 def _norm_bound(M: Array) -> float:

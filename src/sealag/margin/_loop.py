@@ -1,6 +1,7 @@
 """The delayed loop in the form the margin works on: neutral directions out, balanced, low rank."""
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -104,7 +105,7 @@ def real_numbers(name: str, value: ArrayLike, *, what: str) -> Array:
         )
     if given.dtype.kind not in "biuf":
         try:
-            if given.dtype.kind != "O" or any(isinstance(one, str) for one in given.flat):
+            if given.dtype.kind != "O" or not all(isinstance(one, Real) for one in given.flat):
                 raise TypeError
             given = given.astype(float)
         except (TypeError, ValueError):
@@ -119,7 +120,7 @@ def real_numbers(name: str, value: ArrayLike, *, what: str) -> Array:
 def _kind(given: Array) -> str:
     """Name what an array holds that is no number."""
     if given.dtype.kind == "O":
-        return next((type(one).__name__ for one in given.flat if not np.isreal(one)), "object")
+        return next(type(one).__name__ for one in given.flat if not isinstance(one, Real))
     return {"U": "text", "S": "bytes", "M": "dates", "m": "durations"}.get(given.dtype.kind, "data")
 
 
@@ -252,8 +253,8 @@ def _neutral(parts: tuple[Array, ...], *, symmetries: ArrayLike | None) -> tuple
     lost = np.abs(stacked @ basis).max()
     if lost > _STRUCTURE * np.abs(stacked).max():
         raise SolverError(
-            "A column v of symmetries is moved by the dynamics, so it is none: A_0 v, A_1 v or A_e v "
-            f"is {lost:.2g} instead of 0."
+            "A column v of symmetries is moved by the dynamics, so it is none: A_0 v, A_1 v or "
+            f"A_e v is {lost:.2g} instead of 0."
         )
     newest = basis
     inverse = np.linalg.pinv(stacked, rcond=1e-12)

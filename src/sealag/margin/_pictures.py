@@ -1,8 +1,9 @@
 """Two ways to see a crossing: a turn φ of the delay factor, or a frequency ω, as the parameter.
 
-A root jω of delay d has z = e^{-jφ}, φ = ωd. With one delay, λ is an eigenvalue of A_0 + e^{-jφ} A_1
-and φ runs over half a turn. With an embedded delay that is no eigenvalue problem; there ω runs, and
-w = z_0/(z − z_0) is an eigenvalue of z_0 G(jω), G = C (jω − A_0 − z_0 A_1 − A_e e^{-jωe})⁻¹ B.
+A root jω of delay d has z = e^{-jφ}, φ = ωd. With one delay, λ is an eigenvalue of A_0 +
+e^{-jφ} A_1 and φ runs over half a turn. With an embedded delay that is no eigenvalue problem; there
+ω runs, and w = z_0/(z − z_0) is an eigenvalue of z_0 G(jω),
+G = C (jω − A_0 − z_0 A_1 − A_e e^{-jωe})⁻¹ B.
 """
 
 import math
@@ -138,11 +139,14 @@ class Frequency:
         loop: the loop.
         at_most: longest delay that counts, s; inf for all.
         reference: z_0, 1 or −1, for which no root lies on the imaginary axis.
+        seen_in: (n, n) basis in which bounds of the resolvent are taken, and its inverse: near the
+            eigenvectors they are closer.
     """
 
     loop: Loop
     at_most: float
     reference: float
+    seen_in: tuple[Array, Array]
 
     @property
     def edges(self) -> list[float]:
@@ -151,7 +155,11 @@ class Frequency:
         return [0.0, *np.geomspace(1e-3 * top, top, 16).tolist()]
 
     def family(self, t: float) -> Family | None:
-        """Eigenvalues of z_0 G(jω) about ω = t, moved by ½ so that |z| = 1 is the axis."""
+        """Eigenvalues of z_0 G(jω) about ω = t, moved by ½ so that |z| = 1 is the axis.
+
+        P moves by δ = jΔ P' + ε with |ε| ≤ (e^{he} − 1 − he) |A_e|, and G by −C R δ R B + the rest
+        C R (δR) (I + δR)⁻¹ δ R B.
+        """
         loop, e = self.loop, self.loop.embedded_delay
         P, slope = loop.characteristic(1j * t, self.reference)
         if t == 0.0:
@@ -169,20 +177,26 @@ class Frequency:
         turned = slope @ right
         bent = slope @ (R @ turned) + 0.5 * e**2 * (loop.A_e @ right)
         rounding = (len(P) + 2) * EPS * (np.abs(left) @ np.abs(P) @ np.abs(right))
-        size, late = float(np.linalg.norm(R, 2)), float(np.linalg.norm(loop.A_e, 2))
+        V, to = self.seen_in
+        seen, late = to @ slope @ R @ V, to @ loop.A_e @ R @ V
+        along, across = float(np.linalg.norm(seen, 2)), float(np.linalg.norm(late, 2))
+        columns = np.linalg.norm(to @ turned, axis=0)
+        columns += e * np.linalg.norm(to @ (loop.A_e @ right), axis=0)
 
         def remainder(h: float) -> float:
-            grown = math.expm1(min(h * e, 500.0))
-            moved = h + late * grown
-            room = 1.0 - 1.0001 * moved * size
-            return late * (grown - h * e) + moved**2 * size / room if room > 0.0 else math.inf
+            bent = _turned(h * e)
+            moved = 1.0001 * (h * along + bent * across)
+            if not moved < 1.0:
+                return math.inf
+            share = bent / (h * e)
+            return h * (max(1.0, share) * moved / (1.0 - moved) + share)
 
         return Family(
             centre=t,
             values=values + 0.5,
             motion=-1j * self.reference * (left @ turned),
             bend=-self.reference * np.sum(left * bent.T, axis=1),
-            rest=np.linalg.norm(left, axis=1)[:, None] * np.linalg.norm(right, axis=0),
+            rest=np.linalg.norm(left @ V, axis=1)[:, None] * columns,
             blur=blur + rounding,
             remainder=remainder,
             real=self.symmetric(t),
@@ -221,9 +235,23 @@ class Frequency:
         return 2e-9 * max(t, 1e-9 * self.loop.size)
 
 
+def frequency_of(loop: Loop, *, at_most: float, reference: float) -> Frequency:
+    """Choose the basis in which the resolvent is bounded.
+
+    Args:
+        loop: a loop with an embedded delay.
+        at_most: longest delay that counts, s; inf for all.
+        reference: z_0.
+    """
+    basis = _eigenbasis(loop.A_0 + reference * loop.A_1 + loop.A_e)
+    identity = np.eye(len(loop.A_0))
+    seen_in = (identity, identity) if basis is None else basis[1:3]
+    return Frequency(loop=loop, at_most=at_most, reference=reference, seen_in=seen_in)
+
+
 def _turned(h: float) -> float:
     """|e^{-jΔ} − 1 + jΔ| ≤ e^h − 1 − h for complex |Δ| ≤ h."""
-    return math.expm1(h) - h if h > 1e-3 else 0.5001 * h * h
+    return math.expm1(min(h, 500.0)) - h if h > 1e-4 else 0.5001 * h * h
 
 
 def _eigenbasis(A: Array) -> tuple[Array, Array, Array, Array] | None:

@@ -23,8 +23,9 @@ def rightmost_roots(
     """Rightmost roots of det(λ − A_0 − A_1 e^{-λd} − A_e e^{-λe}) = 0.
 
     The generator of the solution semigroup is discretised on Chebyshev nodes over the longer delay,
-    in two pieces where there are two delays (Breda, Maset & Vermiglio), and every root refined by Newton's method on the characteristic
-    equation. Independent of `delay_margin`; a heuristic where `nodes` resolve too little.
+    in two pieces where there are two delays (Breda, Maset & Vermiglio), and every root refined by
+    Newton's method on the characteristic equation. Independent of `delay_margin`; a heuristic where
+    `nodes` resolve too little.
 
     Args:
         A_0: (n, n) undelayed part, 1/s.
@@ -114,7 +115,7 @@ def _differentiation(N: int) -> Array:
 
 def _newton(loop: Loop, delay: float, root: complex) -> complex:
     """Newton on the smallest singular direction; the start where it wanders off."""
-    start = root
+    start, longest = root, max(_pieces(loop, delay))
     for _ in range(12):
         factor = np.exp(-root * delay)
         P, rate = loop.characteristic(root, factor)
@@ -125,7 +126,7 @@ def _newton(loop: Loop, delay: float, root: complex) -> complex:
             break
         step = values[-1] / slope
         root = root - step
-        if abs(root - start) > 0.1 * max(abs(start), 1.0 / delay):
+        if abs(root - start) > 0.1 * max(abs(start), 1.0 / longest):
             return start
         if abs(step) <= 1e-14 * max(abs(root), 1e-300):
             break

@@ -7,6 +7,7 @@ at most once. What is too narrow to split is left as a band.
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 from sealag.errors import SolverError
@@ -87,7 +88,7 @@ def search(picture: Picture) -> tuple[list[Passage], list[Band]]:
         SolverError: more samples than any sensible loop needs.
     """
     edges = picture.edges
-    todo = [_piece(picture, one, other) for one, other in zip(edges, edges[1:], strict=False)]
+    todo = [_piece(picture, one, other) for one, other in pairwise(edges)]
     passages: list[Passage] = []
     bands: list[Band] = []
     samples = 0
@@ -109,9 +110,11 @@ def search(picture: Picture) -> tuple[list[Passage], list[Band]]:
         narrow = piece.upper - piece.lower <= picture.width(piece.centre)
         blurred = family is not None and family.blurred(piece.half)
         if not taken and (narrow or blurred):
-            bands.append(Band(lower=piece.lower, upper=piece.upper, end=piece.end == piece.end))
+            end = any(picture.symmetric(t) for t in (piece.lower, piece.upper))
+            bands.append(Band(lower=piece.lower, upper=piece.upper, end=end))
         elif not taken:
-            todo += _halves(piece)
+            resting = family is not None and family.rests
+            todo += _halves(piece if resting else piece._replace(end=math.nan))
         else:
             rest = [(piece.lower, lower), (upper, piece.upper)]
             todo += [Piece(a, b, math.nan) for a, b in rest if b > a]

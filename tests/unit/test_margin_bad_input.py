@@ -1,0 +1,52 @@
+"""What is no matrix of real numbers is refused in one sentence that says why."""
+
+import numpy as np
+import pytest
+
+from sealag.errors import InputError
+from sealag.margin import delay_margin, delay_margins, rightmost_roots
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (None, "A_0 is nothing"),
+        ("fast", "A_0 is no array of numbers (text)"),
+        ([["a", "b"], ["c", "d"]], "A_0 is no array of numbers (text)"),
+        ([[1.0, 2.0], [3.0]], "A_0 has rows of different lengths"),
+        ([[1.0 + 2.0j]], "A_0 is complex"),
+        ([[object()]], "A_0 is no array of numbers (object)"),
+        ([[{"k": 1}]], "A_0 is no array of numbers (dict)"),
+        ([[None]], "A_0 is no array of numbers (NoneType)"),
+        (np.array([["2020-01-01"]], dtype="M8[D]"), "A_0 is no array of numbers (dates)"),
+        ([[np.nan]], "A_0 has entries that are not finite"),
+        ([[1.0, 2.0]], "A_0 has shape (1, 2)"),
+        (3.0, "A_0 has shape ()"),
+    ],
+)
+def test_sentence_says_what_is_wrong(value, words: str) -> None:
+    for ask in (delay_margin, lambda A_0, A_1: rightmost_roots(A_0, A_1, 0.1)):
+        with pytest.raises(InputError) as refused:
+            ask(value, [[1.0]])
+        assert str(refused.value).startswith(words)
+        assert str(refused.value).endswith(".")
+
+
+def test_other_arguments_are_checked_the_same_way() -> None:
+    with pytest.raises(InputError, match="A_1 is nothing"):
+        delay_margin([[1.0]], None)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="symmetries is no array of numbers"):
+        delay_margin([[0.0]], [[0.0]], symmetries="yaw")
+    with pytest.raises(InputError, match="horizon is -1"):
+        delay_margin([[0.0]], [[-1.0]], horizon=-1.0)
+    with pytest.raises(InputError, match="delay is no array of numbers"):
+        rightmost_roots([[0.0]], [[-1.0]], "soon")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="A_0 is complex"):
+        delay_margins(1j * np.ones((1, 1, 1)), np.ones((1, 1, 1)))
+
+
+def test_numbers_of_other_kinds_are_taken() -> None:
+    from fractions import Fraction
+
+    assert delay_margin([[0]], [[Fraction(-1)]]).delay == pytest.approx(np.pi / 2)
+    assert delay_margin([[False]], [[-1]]).delay == pytest.approx(np.pi / 2)

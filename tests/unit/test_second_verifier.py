@@ -1,0 +1,152 @@
+"""The second verifier: one short file that shares nothing with the first, and finds forgeries."""
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sealag.second_verifier
+from helpers.certificates import made, resealed
+from sealag.cli import main
+from sealag.second_verifier import claims
+
+FILE = Path(sealag.second_verifier.__file__)
+
+
+def verdicts(data):
+    return {name: holds for name, holds, _ in claims(resealed(data))}
+
+
+def test_it_is_short_and_stands_alone():
+    text = FILE.read_text()
+    assert len(text.splitlines()) <= 400
+    for node in ast.walk(ast.parse(text)):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        assert all(name.split(".")[0] in sys.stdlib_module_names for name in names)
+
+
+@pytest.mark.parametrize("design", ["baxter", "moving", "crawl", "one foot"])
+def test_it_agrees_with_the_first(design):
+    found = verdicts(made(design))
+    assert False not in found.values(), [name for name, holds in found.items() if holds is False]
+    undecided = {name for name, holds in found.items() if holds is None}
+    assert "first crossing and local margin" in undecided
+    assert found["unstable modes without delay"] is True
+
+
+def _scaled(*path, factor):
+    def change(data):
+        for key in path[:-1]:
+            data = data[key]
+        data[path[-1]] *= factor
+
+    return change
+
+
+def _shift(d):
+    for window in d["time_varying_windows"]:
+        window["centre"][0][0] *= 0.999
+
+
+FORGED = {
+    "longer": ("moving", "instant 0: [[2D", _scaled("proofs", 0, "delay_s", factor=1.00001)),
+    "multiplier": ("moving", "instant 0: W", _scaled("proofs", 0, "W", 0, 0, 1, factor=1.1)),
+    "stiffness": ("moving", "instant 0: F follows", _scaled("proofs", 0, "F", 0, 0, factor=1.01)),
+    "springs": ("baxter", "instant 0: F follows", _scaled("spring_stiffness", 0, factor=1.01)),
+    "damping": ("moving", "no longer delay", _scaled("D_theta", 0, factor=1.01)),
+    "levels": (
+        "crawl",
+        "instant 0: S couples",
+        lambda d: d["proofs"][0]["stiffness"][0].__setitem__(7, 1.0),
+    ),
+    "printed": ("crawl", "instant 0: [[2D", _scaled("proofs", 0, "W", 1, 0, 0, factor=0.5)),
+    "bound": ("moving", "smallest bound", _scaled("max_delay_s", factor=1.01)),
+    "upper": ("moving", "no longer delay", _scaled("max_delay_upper_s", factor=0.999)),
+    "common": ("moving", "common multiplier at", _scaled("common_multiplier_delay_s", factor=1.01)),
+    "ball": (
+        "moving",
+        "time-varying multiplier at",
+        lambda d: d["time_varying_windows"][0].update(radius=0.1),
+    ),
+    "place": (
+        "moving",
+        "windows hold the proven",
+        _shift,
+    ),
+    "cover": ("moving", "windows cover", lambda d: d["time_varying_windows"].pop()),
+    "modes": ("moving", "unstable modes", lambda d: d.update(unstable_modes=3)),
+    "stable": ("moving", "stability", lambda d: d.update(stable=True)),
+    "rates": (
+        "moving",
+        "positions change",
+        lambda d: d["local_loop"]["A_0"][0].__setitem__(0, 1.0),
+    ),
+    "status": ("moving", "status follows", lambda d: d.update(status="not_certified")),
+    "asymmetry": (
+        "moving",
+        "instant 0: F is symmetric",
+        lambda d: d["proofs"][0]["F"][0].__setitem__(1, 3.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_a_forgery_does_not_hold(name):
+    design, claim, change = FORGED[name]
+    data = made(design)
+    change(data)
+    failed = [what for what, holds in verdicts(data).items() if holds is False]
+    assert any(what.startswith(claim) for what in failed), failed
+
+
+def test_a_window_with_many_axes_is_left_undecided():
+    data = made("moving")
+    data["time_varying_windows"][0]["axes"] *= 20
+    assert verdicts(data)["time-varying multiplier"] is None
+
+
+def test_it_runs_as_a_file_and_by_the_command(tmp_path, capsys):
+    def command(*arguments):
+        with pytest.raises(SystemExit) as stop:
+            main(["verify", "--second", *map(str, arguments)])
+        return stop.value.code, *capsys.readouterr()
+
+    def alone(path):
+        done = subprocess.run(
+            [sys.executable, "-I", str(FILE), str(path)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return done.returncode, done.stdout
+
+    path = tmp_path / "c.json"
+    path.write_text(json.dumps(made("one foot")))
+    code, text = alone(path)
+    assert code == 0
+    assert "holds          unstable modes without delay: 4 roots" in text
+    assert "cannot decide  first crossing" in text
+    code, text, _ = command(path)
+    assert (code, text.splitlines()[-1]) == (0, "no claim fails")
+    code, text, _ = command(path, "--json")
+    assert json.loads(text)["valid"] is True
+    data = made("one foot")
+    data["unstable_modes"] = 0
+    path.write_text(json.dumps(resealed(data)))
+    assert alone(path)[0] == 1
+    assert command(path)[0] == 1
+    for text in ("{", "[]", json.dumps({**data, "joints": 3}), '{"schema": 1, "schema": 2}',
+                 json.dumps({**data, "delay_s": None})):  # fmt: skip
+        path.write_text(text)
+        assert alone(path)[0] == 2
+        code, _, err = command(path)
+        assert code == 2
+        assert err.startswith("sealag: ")
+        assert err.count("\n") == 1
+    code, _, err = command(path, "--exact")
+    assert code == 2
+    assert "--second stands alone" in err
