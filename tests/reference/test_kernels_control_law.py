@@ -82,25 +82,30 @@ def test_errors_of_lower_tasks_move_as_their_own_jacobian_says(levels):
         assert np.abs(J - space.J_star).max() > 0.1
 
 
+@pytest.mark.parametrize("plain", [False, True])
 @pytest.mark.parametrize("slope", [0.0, 1.0])
 @pytest.mark.parametrize("symmetric", [True, False])
-def test_static_step_is_newton_s(symmetric, slope):
-    """l(q̄) = J*ᵀ S x̃ + ḡ has the gradient −J*ᵀ S J* + ∂ḡ/∂q."""
+def test_static_step_is_newton_s(symmetric, slope, plain):
+    """l(q̄) = J*ᵀ S x̃ + ḡ has the gradient −J*ᵀ S J + ∂ḡ/∂q, −J the errors' Jacobian."""
     rng = np.random.default_rng(8)
     m, n = 4, 6
     J, X = rng.normal(size=(m, n)), rng.normal(size=(m, m))
     S = X @ X.T if symmetric else X @ X.T + 0.3 * (X - X.T)
-    F, G = J.T @ S @ J, slope * 5.0 * rng.normal(size=(n, n))
+    moved_by = J + 0.3 * rng.normal(size=(m, n)) if plain else J
+    F, G = J.T @ S @ moved_by, slope * 5.0 * rng.normal(size=(n, n))
     K = 1.5 * np.linalg.norm(F - G, 2) * rng.uniform(1.0, 2.0, n)
     torque, sag = rng.normal(size=n), rng.normal(size=n)
     step, moved = np.zeros(n), sag.copy()
-    assert static_step(J, S, G, K, torque, moved, np.zeros((n, n)), step)
+    assert static_step(J, moved_by, S, G, K, torque, moved, np.zeros((n, n)), step)
     expected = np.linalg.solve(np.diag(K) - F + G, -K * sag - torque)
     np.testing.assert_allclose(step, expected, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(moved, sag + expected, rtol=1e-9)
     if slope:
         without = np.linalg.solve(np.diag(K) - F, -K * sag - torque)
         assert np.abs(step - without).max() > 1e-3 * np.abs(step).max()
+    if plain:
+        wrong = np.linalg.solve(np.diag(K) - J.T @ S @ J + G, -K * sag - torque)
+        assert np.abs(step - wrong).max() > 1e-3 * np.abs(step).max()
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -116,7 +121,7 @@ def test_static_step_refuses_exactly_where_the_fixed_point_is_no_contraction(see
         scaled = share / factor
         task, slope = (S * scaled, 0.0 * F) if of == "tasks" else (0.0 * S, -F * scaled)
         exists = static_step(
-            J, task, slope, K, np.zeros(5), np.zeros(5), np.zeros((5, 5)), np.zeros(5)
+            J, J, task, slope, K, np.zeros(5), np.zeros(5), np.zeros((5, 5)), np.zeros(5)
         )
         assert exists == (share < 1.0)
 

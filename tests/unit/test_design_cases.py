@@ -64,8 +64,9 @@ def test_followers_of_a_urdf_move_with_their_leaders():
 
 
 @pytest.mark.parametrize(
-    ("bandwidth", "damped", "margin"), [(100.0, False, 91.99), (600.0, False, 100.33), (100.0, True, 97.84)]
-)  # fmt: skip
+    ("bandwidth", "damped", "margin"),
+    [(100.0, False, 91.99), (600.0, False, 100.33), (100.0, True, 97.84)],
+)
 def test_slow_drives_cost_margin(bandwidth, damped, margin):
     system = case("s2_torque_bandwidth_baxter")
     system = with_drives(system, torque_bandwidth=np.full(14, bandwidth))
@@ -112,7 +113,7 @@ def test_late_torque_feedback_is_unstable_and_refused():
     assert certificate.status == "not_certified"
     assert "torque feedback of j is late by 12.000 ms" in certificate.reasons[0]
     assert (certificate.stable, certificate.unstable_modes) == (False, 2)
-    assert not any("torque_feedback" == one.key for one in certificate.assumptions)
+    assert not any(one.key == "torque_feedback" for one in certificate.assumptions)
     at_once = replace(system, delays=replace(system.delays, delayed_torque_feedback=False))
     assert sealag.certify(at_once).stable is True
     run = sealag.simulate(system, scenario="track", duration=2.0)
@@ -200,9 +201,7 @@ def test_a_quantile_says_what_it_leaves_out():
     """The median is no upper bound: of 50 samples 25 are later."""
     system = case("unclear_quantile")
     samples = np.loadtxt(CASES / "samp.txt")
-    texts = [
-        one.text for one in sealag.certify(system).assumptions if one.key == "delay_quantile"
-    ]
+    texts = [one.text for one in sealag.certify(system).assumptions if one.key == "delay_quantile"]
     later = np.mean(samples > np.quantile(samples, 0.5))
     assert later == 0.5
     assert len(texts) == 2

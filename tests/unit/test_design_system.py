@@ -86,7 +86,9 @@ embedded_round_trip = { kind = "constant", value_ms = 2.0 }
     read = load(tmp_path / "arm.toml")
     assert own.delays.d_1 == read.delays.d_1
     for name in ("A_0", "A_1", "A_e"):
-        np.testing.assert_allclose(getattr(own.frozen(), name), getattr(read.frozen(), name), atol=1e-9)
+        np.testing.assert_allclose(
+            getattr(own.frozen(), name), getattr(read.frozen(), name), atol=1e-9
+        )
     ours, theirs = sealag.certify(own), sealag.certify(read)
     assert ours.max_delay_s == pytest.approx(theirs.max_delay_s, rel=1e-12)
     assert ours.local_margin_s == pytest.approx(theirs.local_margin_s, rel=1e-9)

@@ -49,7 +49,9 @@ AGREE = 1e-6  # of the largest entry: rounding and truncation of two central dif
 def settling(name):
     """A signal by its word, with enough iterations to settle in one tick."""
     signal = signal_named(name)
-    return signal if isinstance(signal, MotorAngles | LinkAngles) else replace(signal, iterations=20)
+    return (
+        signal if isinstance(signal, MotorAngles | LinkAngles) else replace(signal, iterations=20)
+    )
 
 
 def running(system, changes):

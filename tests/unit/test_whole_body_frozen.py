@@ -60,7 +60,7 @@ def by_hand(system, q, *, late=False, links=False):
     x = np.eye(size)
     q_, theta, q_rate, theta_rate = (x[k * n : (k + 1) * n] for k in range(4))
     torque = {joint: x[4 * n + k] for k, joint in enumerate(slow)}
-    K, D_s, D = (np.diag(v) for v in (drives.spring_stiffness, drives.spring_damping, drives.motor_damping))
+    K, D_s = np.diag(drives.spring_stiffness), np.diag(drives.spring_damping)
     spring = K @ (theta - q_) + D_s @ (theta_rate - q_rate)
     M_inverse = np.linalg.inv(robot.mass_matrix(q))
     A_0, A_1, A_e = np.zeros((3, size, size))

@@ -1,4 +1,4 @@
-"""Where the loop rests: equilibria solved by hand, balance, overload, and what the simulator keeps."""
+"""Where the loop rests: equilibria solved by hand, balance, and what the simulator keeps."""
 
 from dataclasses import replace
 
@@ -49,7 +49,9 @@ def by_hand(system, signal, gravity):
                 law = static
             case _:  # x̂ has come to q̄; compensation that is fed back is taken at θ
                 law = static - compensation(q_bar) + compensation(theta)
-        return np.concatenate([robot.gravity(q) - springs, springs - law, K * (theta - q_bar) - static])
+        return np.concatenate(
+            [robot.gravity(q) - springs, springs - law, K * (theta - q_bar) - static]
+        )
 
     found = root(residual, np.tile(q_d, 3), tol=1e-13).x
     assert np.abs(residual(found)).max() < 1e-10
@@ -82,7 +84,9 @@ def test_rest_is_the_equilibrium_written_out(tmp_path, signal, gravity):
 
 @pytest.mark.parametrize("gravity", list(GravityCompensation))
 @pytest.mark.parametrize("signal", SIGNAL_NAMES)
-def test_in_the_posture_the_tasks_have_no_error_and_springs_carry_gravity(tmp_path, signal, gravity):
+def test_in_the_posture_the_tasks_have_no_error_and_springs_carry_gravity(
+    tmp_path, signal, gravity
+):
     """What a controller commands there is its compensation alone."""
     system = system_of(tmp_path, signal, gravity)
     there = system.in_posture()
@@ -136,7 +140,5 @@ def test_on_one_foot_the_centre_of_mass_comes_above_it():
 
 def test_a_softer_law_sags_more(tmp_path):
     system = system_of(tmp_path, "motor", GravityCompensation.NONE)
-    soft = replace(
-        system, law=replace(system.law, tasks=(joint_task(system.robot, 0.5 * GAIN),))
-    )
+    soft = replace(system, law=replace(system.law, tasks=(joint_task(system.robot, 0.5 * GAIN),)))
     assert soft.rest().moved > 1.2 * system.rest().moved

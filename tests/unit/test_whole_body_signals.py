@@ -1,4 +1,4 @@
-"""What the law is taken at: stiffness, refusals, and the derivative of what the controller ticks."""
+"""What the law is taken at: stiffness, refusals, and the derivative of what runs."""
 
 from dataclasses import replace
 
@@ -89,7 +89,7 @@ def system_of(folder, signal, gravity):
 
 
 def settled(system, rest, *, q, theta, ticks=40, period=0.0):
-    """The command (n,) of the controller that has come to rest, then sees q and θ for some ticks."""
+    """The command (n,) of a controller that is at rest, then sees q and θ for some ticks."""
     controller, out = system.controller(), np.zeros(2)
     measured = Measurement.allocate(nq=2, nv=2, n=2)
     measured.q[:], measured.theta[:] = rest.q, rest.theta
@@ -120,6 +120,7 @@ def derivative(system, rest, **ticks):
 
 def parts(loop):
     """Columns of C that belong to q, to θ, and to the memory; and the memory's own rows."""
+
     def columns(begin):
         return [i for i, name in enumerate(loop.states) if name.startswith(begin)]
 
