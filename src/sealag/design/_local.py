@@ -162,9 +162,11 @@ class _Decision:
             delay = float(self._bounds.delay[k])
             self._found[k] = InstantMargin(basis=Basis.BOUND, delay=delay)
         for k in sorted(minima, key=lambda at: float(self._bounds.delay[at])):
-            if self._bounds.delay[k] >= self._least():
+            if self._best is not None and self._bounds.delay[k] >= self._least():
                 break
             self._search(k, minima[k])
+        if self._best is None:  # no search came to an end
+            self._decide(min(minima, key=lambda at: float(self._bounds.delay[at])))
         assert self._best is not None
         return Local(
             instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
