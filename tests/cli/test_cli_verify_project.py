@@ -84,8 +84,8 @@ def test_what_a_forger_may_reseal_is_found_with_the_project(name):
 def test_a_true_certificate_of_another_design_is_found():
     """Softer tasks, honestly certified, under the hashes of this project."""
     system, _ = design("baxter")
-    tasks = tuple(replace(task, stiffness=0.5 * task.stiffness) for task in system.hierarchy.tasks)
-    softer = replace(system, hierarchy=replace(system.hierarchy, tasks=tasks))
+    tasks = tuple(replace(task, stiffness=0.5 * task.stiffness) for task in system.law.tasks)
+    softer = replace(system, law=replace(system.law, tasks=tasks))
     data = plain(sealag.certify(softer))
     assert data["max_delay_s"] > 1.5 * made("baxter")["max_delay_s"]
     assert verify(data).valid
