@@ -15,7 +15,7 @@ from helpers.certificates import failures, plain, resealed
 from sealag.delay import Constant, Delays
 from sealag.passivity import Criterion, verify
 from sealag.robot import Contact, ContactKind
-from sealag.whole_body import Feedback, Hierarchy, StiffnessForm, Task
+from sealag.whole_body import Law, MotorAngles, StiffnessForm, Task
 
 K_REPEATED, D_REPEATED = 200.0, 25.0
 
@@ -25,7 +25,7 @@ def standing():
     system = sealag.load("bundled:hume")
     return replace(
         system,
-        feedback=Feedback.MOTOR,
+        law=replace(system.law, signal=MotorAngles()),
         contacts=(Contact(frame="right_foot", kind=ContactKind.SURFACE),),
         actuators=replace(system.actuators, spring_stiffness=np.full(6, 2e4)),
         delays=Delays(central=Constant(value=1e-3), embedded=Constant(value=0.0)),
@@ -35,9 +35,9 @@ def standing():
 def gains(system, *factors):
     tasks = tuple(
         replace(task, stiffness=factor * task.stiffness)
-        for task, factor in zip(system.hierarchy.tasks, factors, strict=True)
+        for task, factor in zip(system.law.tasks, factors, strict=True)
     )
-    return replace(system, hierarchy=replace(system.hierarchy, tasks=tasks))
+    return replace(system, law=replace(system.law, tasks=tasks))
 
 
 def torque_unit(factor):
@@ -48,7 +48,7 @@ def torque_unit(factor):
         spring_stiffness=factor * system.actuators.spring_stiffness,
         motor_damping=factor * system.actuators.motor_damping,
     )
-    return gains(replace(system, actuators=springs), *[factor] * len(system.hierarchy.tasks))
+    return gains(replace(system, actuators=springs), *[factor] * len(system.law.tasks))
 
 
 def time_unit(factor):
@@ -66,7 +66,7 @@ def repeated():
     posture = Task(name="posture", kind="posture", stiffness=np.array(K_REPEATED))
     return replace(
         system,
-        hierarchy=Hierarchy(tasks=(posture,), form=StiffnessForm.FORCE),
+        law=Law(tasks=(posture,), stiffness_form=StiffnessForm.FORCE),
         actuators=replace(system.actuators, motor_damping=np.full(6, D_REPEATED)),
     )
 

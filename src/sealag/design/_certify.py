@@ -28,6 +28,7 @@ from sealag.passivity import (
     Certificate,
     Criterion,
     Critical,
+    LocalLoop,
     Rest,
     Solver,
     Status,
@@ -282,8 +283,12 @@ def _over_motion(motion: Motion, local: Local) -> dict[str, Any]:
         "unstable_modes": local.unstable_modes,
         "instant_margins_s": [None if np.isnan(one.delay) else one.delay for one in local.instants],
         "instant_basis": [one.basis for one in local.instants],
-        "local_loop": None if local.loop is None else stated_loop(local.loop, local.margin),
+        "local_loop": _stated(local),
     }
+
+
+def _stated(local: Local) -> LocalLoop | None:
+    return None if local.loop is None else stated_loop(local.loop, local.margin, local.at)
 
 
 def _shared(bounds: Bounds, common: Common | None, moving: Moving | None) -> dict[str, Any]:

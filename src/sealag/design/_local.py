@@ -8,7 +8,7 @@ from sealag.design._criteria import ASYMMETRY_TOLERANCE, Bounds
 from sealag.design._system import System
 from sealag.errors import ContractionError, SolverError
 from sealag.margin import DelayMargin, delay_margin
-from sealag.passivity import Basis
+from sealag.passivity import Basis, Place
 from sealag.robot import Motion
 from sealag.typing import Array
 from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, Spaces, sea_loop
@@ -49,6 +49,7 @@ class Local:
             most unstable roots.
         margin: its exact margin; None if none could be decided.
         loop: its frozen loop; None where the law has none.
+        at: where that is frozen.
         rest: where it rests; None if it was not looked for.
         problem: why the critical instant has no margin, in words; empty if it has.
     """
@@ -57,6 +58,7 @@ class Local:
     critical: int
     margin: DelayMargin | None
     loop: FrozenLoop | None
+    at: Place
     rest: Rest | None
     problem: str
 
@@ -124,6 +126,7 @@ class _Known:
 
     margin: DelayMargin | None
     loop: FrozenLoop | None
+    at: Place
     rest: Rest
     problem: str
 
@@ -170,7 +173,8 @@ class _Decision:
         assert self._best is not None
         return Local(
             instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
-            loop=self._best.loop, rest=self._best.rest, problem=self._best.problem,
+            loop=self._best.loop, at=self._best.at, rest=self._best.rest,
+            problem=self._best.problem,
         )  # fmt: skip
 
     def _least(self) -> float:
@@ -196,17 +200,17 @@ class _Decision:
         if margin.delay < least or np.isinf(least):
             self._found[k] = InstantMargin(basis=Basis.EXACT, delay=float(margin.delay))
             rest = self._system.in_posture(self._motion, k)
-            self._best = _Known(margin=margin, loop=loop, rest=rest, problem="")
+            self._best = _Known(margin=margin, loop=loop, at=Place.POSTURE, rest=rest, problem="")
             self._critical = k
         else:
             self._found[k] = InstantMargin(basis=Basis.SEARCHED, delay=least)
 
     def _decide(self, k: int) -> bool:
         """Decide an instant exactly; return whether it is unstable without delay."""
-        states = [self._system.in_posture(self._motion, k)]
-        if not (self._system.law.rests_at_posture and states[0].found):
-            states.append(self._system.rest(self._motion, k))
-        worst = min((self._at(k, state) for state in states), key=_Known.order)
+        states = {Place.POSTURE: self._system.in_posture(self._motion, k)}
+        if not (self._system.law.rests_at_posture and states[Place.POSTURE].found):
+            states[Place.REST] = self._system.rest(self._motion, k)
+        worst = min((self._at(k, *state) for state in states.items()), key=_Known.order)
         unstable = worst.delay == 0.0
         if worst.delay is not None:
             self._found[k] = InstantMargin(
@@ -216,7 +220,7 @@ class _Decision:
             self._best, self._critical = worst, k
         return unstable
 
-    def _at(self, k: int, state: Rest) -> "_Known":
+    def _at(self, k: int, at: Place, state: Rest) -> "_Known":
         """What is known of the loop of an instant, frozen at a state."""
         loop, margin, problem = None, None, state.reason
         try:
@@ -224,7 +228,7 @@ class _Decision:
             margin = margin_of(loop)
         except (ContractionError, SolverError) as error:
             problem = problem or str(error)
-        return _Known(margin=margin, loop=loop, rest=state, problem=problem)
+        return _Known(margin=margin, loop=loop, at=at, rest=state, problem=problem)
 
     def _minima(self) -> dict[int, FreeLinks]:
         """Links at the instants that a potential decides: stable, with a margin above the bound."""
