@@ -105,7 +105,8 @@ def local_of(system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> 
 
     Each instant is a loop that holds the instant's configuration. It is frozen in that
     configuration and, where the law sags, where it rests with the references as they are; the
-    smaller margin counts. Where the law has a potential, rests at the instant itself, joints
+    smaller margin counts. An instant of a motion that is unstable in its configuration is not
+    looked at elsewhere. Where the law has a potential, rests at the instant itself, joints
     determine all motions and the drives are ideal, a strict minimum of the potential is stable
     without delay, and the passive bound lies below the margin (V̇ ≤ 0 for delays up to it): such an
     instant is decided exactly only if its bound lies below the smallest margin known. All others
@@ -207,10 +208,12 @@ class _Decision:
 
     def _decide(self, k: int) -> bool:
         """Decide an instant exactly; return whether it is unstable without delay."""
-        states = {Place.POSTURE: self._system.in_posture(self._motion, k)}
-        if not (self._system.law.rests_at_posture and states[Place.POSTURE].found):
-            states[Place.REST] = self._system.rest(self._motion, k)
-        worst = min((self._at(k, *state) for state in states.items()), key=_Known.order)
+        known = [self._at(k, Place.POSTURE, self._system.in_posture(self._motion, k))]
+        settled = self._system.law.rests_at_posture and known[0].rest.found
+        lost = len(self._motion) > 1 and known[0].delay == 0.0
+        if not (settled or lost):
+            known.append(self._at(k, Place.REST, self._system.rest(self._motion, k)))
+        worst = min(known, key=_Known.order)
         unstable = worst.delay == 0.0
         if worst.delay is not None:
             self._found[k] = InstantMargin(
