@@ -204,8 +204,8 @@ def test_a_quantile_says_what_it_leaves_out():
     texts = [one.text for one in sealag.certify(system).assumptions if one.key == "delay_quantile"]
     later = np.mean(samples > np.quantile(samples, 0.5))
     assert later == 0.5
-    assert len(texts) == 2
-    assert all(f"{later:.1%} of the packets" in text for text in texts)
+    assert len(texts) == 1
+    assert texts[0].count(f"{later:.1%} of the packets") == 2
     keys = {one.key for one in sealag.certify(case("dampbest")).assumptions}
     assert "delay_quantile" not in keys
 

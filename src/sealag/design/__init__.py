@@ -1,7 +1,7 @@
 """The user's project file, motions in and out, and the certificate of a design."""
 
 from sealag.design._assumptions import assumptions_of
-from sealag.design._certify import certify
+from sealag.design._certify import certify, check_question
 from sealag.design._criteria import (
     ASYMMETRY_TOLERANCE,
     Bounds,
@@ -29,6 +29,7 @@ __all__ = [
     "assumptions_of",
     "certified_bounds",
     "certify",
+    "check_question",
     "load",
     "load_motion",
     "local_margins",

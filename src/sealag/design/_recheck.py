@@ -79,8 +79,9 @@ def _recomputed(data: dict[str, Any], system: System, motion: Motion | None) -> 
     for name, value in fresh.items():
         if name not in _NOT_UNIQUE:
             where = _difference(data[name], value)
-            words = where or "as computed anew"
+            words = where.removeprefix(":").strip() or "as computed anew"
             yield Check(name=f"design: {name}", ok=not where, detail=words)
+    yield _versions(data["versions"], fresh["versions"])
     if data["time_s"] != fresh["time_s"]:
         return
     spaces = system.spaces(motion)
@@ -132,6 +133,14 @@ def _matrices(proof: dict[str, Any], fresh: dict[str, Any] | None, F: Array) -> 
         fits = claimed.shape == found.shape
         gaps.append(float(np.abs(claimed - found).max(initial=0.0)) / size if fits else np.inf)
     return Check(name=name, ok=max(gaps) <= AGREEMENT, detail=f"to {max(gaps):.1e}")
+
+
+def _versions(claimed: dict[str, str], here: dict[str, str]) -> Check:
+    """Another sealag answers in its own way; other libraries round in another way, and may."""
+    same = set(claimed) == set(here) and claimed["sealag"] == here["sealag"]
+    others = [f"{name} {v}" for name, v in claimed.items() if v != here.get(name)]
+    words = f"others than here: {', '.join(others)}" if others else "those here"
+    return Check(name="design: versions", ok=same, detail=words)
 
 
 def _loop(claimed: dict[str, Any] | None, fresh: dict[str, Any] | None) -> Check:
