@@ -51,10 +51,10 @@ AXES = ("x", "y", "z")
 class Scheme:
     """What a random design is drawn from: shares of robots, and how often each oddity comes."""
 
-    own: float = 0.8
+    own: float = 0.88
     small: float = 0.1
-    arms: float = 0.07
-    legged: float = 0.03
+    arms: float = 0.02
+    legged: float = 0.0
     large: float = 0.0
 
 
