@@ -203,7 +203,7 @@ def _require_linear(f: Callable, D: np.ndarray, width: float) -> None:
     way = np.cos(1.0 + 2.0 * np.arange(D.shape[1]))
     slope = (f(width / 4.0 * way) - f(-width / 4.0 * way)) / (width / 2.0)
     off = float(np.abs(slope - D @ way).max(initial=0.0))
-    if off > CORNERED * max(float(np.abs(D).max()), 1e-6):
+    if off > max(CORNERED * float(np.abs(D).max(initial=0.0)), 1e-6):
         raise Unsettled(f"slopes do not add up: {off:.2g} of {np.abs(D).max():.2g} is left over")
 
 
