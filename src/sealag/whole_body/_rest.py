@@ -123,19 +123,28 @@ class _Search:
 
     def run(self) -> Rest:
         """Return the equilibrium, or the posture with why there is none."""
-        q, theta = self._posture, self._first(self._posture)
         try:
-            residual = self._residual(q, theta)
-            for _ in range(_ROUNDS):
-                if self._small(residual):
-                    return self._answer(q, theta, "")
-                step = self._newton(q, theta, residual)
-                q, theta, residual, better = self._search(q, theta, step, residual)
-                if not better:
-                    break
+            for falling in (True, False):
+                found = self._follow(falling=falling)
+                if found is not None:
+                    return self._answer(*found, "")
         except ContractionError as error:
             return self._answer(self._posture, self._first(self._posture), str(error))
         return self._answer(self._posture, self._held(), self._why())
+
+    def _follow(self, *, falling: bool) -> tuple[Array, Array] | None:
+        """Newton's method from the posture, with steps that let the residual fall, or with whole
+        ones: a soft law sags past where the residual is larger."""
+        q, theta = self._posture, self._first(self._posture)
+        residual = self._residual(q, theta)
+        for _ in range(_ROUNDS):
+            if self._small(residual):
+                return q, theta
+            step = self._newton(q, theta, residual)
+            q, theta, residual, better = self._search(q, theta, step, residual, falling=falling)
+            if not better:
+                return None
+        return None
 
     def posture(self) -> Rest:
         """Return the state in the posture."""
@@ -221,9 +230,15 @@ class _Search:
         return -np.linalg.lstsq(np.vstack(rows), right, rcond=_CUTOFF)[0]
 
     def _search(
-        self, q: Array, theta: Array, step: Array, residual: tuple[Array, Array, Array]
+        self,
+        q: Array,
+        theta: Array,
+        step: Array,
+        residual: tuple[Array, Array, Array],
+        *,
+        falling: bool,
     ) -> tuple[Array, Array, tuple[Array, Array, Array], bool]:
-        """Follow the step as far as the residual falls."""
+        """Follow the step as far as the residual falls, or as far as the law exists."""
         nv, before = self._robot.nv, self._size(residual)
         share = min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
         for _ in range(_HALVINGS):
@@ -233,7 +248,8 @@ class _Search:
                 new = self._residual(new_q, new_theta)
             except ContractionError:
                 new = None
-            if new is not None and (self._size(new) < before or self._small(new)):
+            there = new is not None
+            if there and (not falling or self._size(new) < before or self._small(new)):
                 return new_q, new_theta, new, True
             share /= 2.0
         return q, theta, residual, False
