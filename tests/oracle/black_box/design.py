@@ -134,7 +134,9 @@ def read_design(path: str | Path) -> Design:
         ),
         feedback=data["controller"]["feedback"],
         gravity=data["controller"].get("gravity", "feedback"),
-        tank_pays=all(data["controller"].get(key, 1.0) > 0.0 for key in ("tank_energy_j", "tank_rate")),
+        tank_pays=all(
+            data["controller"].get(key, 1.0) > 0.0 for key in ("tank_energy_j", "tank_rate")
+        ),
         torque_feedback_delay=_embedded_up(delays) if late else 0.0,
     )
 
