@@ -1,4 +1,4 @@
-"""Exit statuses: 0 yes, 1 a decided no, 2 wrong input, 3 the tool itself failed, 130 interrupted."""
+"""Exit statuses: 0 yes, 1 a decided no, 2 wrong input, 3 the tool failed, 130 interrupted."""
 
 import json
 import os
