@@ -122,7 +122,7 @@ FORGED = {
         "local margin",
     ),
     "task inertia": (lambda d: d.update(task_inertia="lambda_star"), NOT_HELD, "task_inertia"),
-    "joint name": (lambda d: _renamed(d, "hip\u001b[2J"), NO_CERTIFICATE, "`joints[0]`"),
+    "joint name": (lambda d: _renamed(d, "hip\u001b[2J"), NO_CERTIFICATE, "short and printable"),
     "joint name of another": (lambda d: _renamed(d, "elbow"), NOT_HELD, "design: joints"),
     "40 axes": (
         lambda d: d.update(time_varying_windows=_window(40)),

@@ -273,7 +273,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         problem = error.format_message().rstrip(".")
         print(f"sealag: {problem}; see sealag {asked}--help.", file=sys.stderr)
         raise SystemExit(WRONG_INPUT) from None
-    except BrokenPipeError:  # whoever read stopped before the answer was told
+    except (BrokenPipeError, SystemExit):  # Typer ends with 1, a no, when the reader is gone
         _write_no_more()
         raise SystemExit(FAILED) from None
     except Exception as error:
