@@ -88,7 +88,11 @@ class Local:
         return float(self.margin.first_crossing)
 
     def undercut(self, bounds: Array) -> list[int]:
-        """Return the instants whose exact margin lies below their bound (N,)."""
+        """Return the instants whose exact margin lies below their bound.
+
+        Args:
+            bounds: (N,) s.
+        """
         return [
             k
             for k, one in enumerate(self.instants)
@@ -96,7 +100,11 @@ class Local:
         ]
 
     def count(self, basis: Basis) -> int:
-        """Return how many instants were decided in a way."""
+        """Return how many instants were decided in a way.
+
+        Args:
+            basis: the way.
+        """
         return sum(one.basis is basis for one in self.instants)
 
 
