@@ -77,28 +77,58 @@ class SignalState(Protocol):
     """A signal that runs: it moves the law from tick to tick."""
 
     def reset(self, t: float, measurement: Measurement) -> None:
-        """Forget the past."""
+        """Forget the past.
+
+        Args:
+            t: first instant, s.
+            measurement: the state then.
+        """
         ...
 
     def command(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Write τ_osc (n,) of a measurement, and move the memory."""
+        """Write τ_osc of a measurement, and move the memory.
+
+        Args:
+            t: the controller's clock, s.
+            measurement: the newest measurement.
+            out: (n,) command, Nm, written.
+        """
         ...
 
     def present(self, measurement: Measurement, out: Array) -> Present:
-        """Write the command (n,) of the true state; the memory stays as it is."""
+        """Write the command of the true state; the memory stays as it is.
+
+        Args:
+            measurement: the true state.
+            out: (n,) command, Nm, written.
+        """
         ...
 
     def wound(self, carried: Array) -> Array:
-        """Return θ − q_j (n,) at which the tasks have no error, given the torque (n,) that springs
-        carry in the posture, Nm."""
+        """Return θ − q_j (n,) at which the tasks have no error.
+
+        Args:
+            carried: (n,) torque that springs carry in the posture, Nm.
+        """
         ...
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
-        """Write the command (n,) of a state that does not move, once it has settled."""
+        """Write the command of a state that does not move, once it has settled.
+
+        Args:
+            q: (nq,) configuration.
+            theta: (n,) motor angles, rad.
+            out: (n,) command, Nm, written.
+        """
         ...
 
     def derivative(self, q: Array, theta: Array) -> LawDerivative:
-        """Return the derivative of what runs, about a state that does not move."""
+        """Return the derivative of what runs, about a state that does not move.
+
+        Args:
+            q: (nq,) configuration.
+            theta: (n,) motor angles, rad.
+        """
         ...
 
     @property
