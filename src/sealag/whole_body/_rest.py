@@ -257,10 +257,15 @@ class _Search:
     def _why(self) -> str:
         left = self._robot.gravity(self._posture) - self._plant.support(self._posture)
         base = float(np.abs(left[: self._robot.nv_base]).max(initial=0.0))
+        if base > 1e-6 * self._scale and not len(self._places):
+            return (
+                "the base floats and nothing holds it: give contacts, or fix the base "
+                '(robot.base = "fixed")'
+            )
         if base > 1e-6 * self._scale:
             return (
-                f"contacts leave {base:.3g} N or Nm of gravity at the base that no contact force "
-                "balances, and no posture nearby is balanced"
+                f"no contact force balances {base:.3g} (N, Nm) of gravity at the base, and no "
+                "posture nearby is balanced"
             )
         return "no balance of springs, gravity and law was found near the posture"
 

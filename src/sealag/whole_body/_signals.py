@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from sealag.errors import InputError, UnknownNameError, either
+from sealag.errors import InputError, UnknownNameError, either, word
 from sealag.typing import Array, BoolArray
 from sealag.whole_body._signal_states import (
     MeasuredAngles,
@@ -245,7 +245,7 @@ class Tank:
         Raises:
             InputError: energy or rate is negative or not finite, or there is no iteration.
         """
-        object.__setattr__(self, "flow", TankFlow(self.flow))
+        object.__setattr__(self, "flow", word(TankFlow, self.flow, what="The tank's flow"))
         for name in ("energy", "rate"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
