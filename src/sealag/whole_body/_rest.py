@@ -248,8 +248,7 @@ class _Search:
                 new = self._residual(new_q, new_theta)
             except ContractionError:
                 new = None
-            there = new is not None
-            if there and (not falling or self._size(new) < before or self._small(new)):
+            if new is not None and (not falling or self._size(new) < before or self._small(new)):
                 return new_q, new_theta, new, True
             share /= 2.0
         return q, theta, residual, False

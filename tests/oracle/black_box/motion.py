@@ -11,7 +11,7 @@ from oracle.black_box.compare import AGREEMENT, Verdict, number, same
 from oracle.black_box.roots import ScanLost
 from sealag.design import load_motion
 
-BASE = "base_x base_y base_z base_qx base_qy base_qz base_qw".split()
+BASE = ["base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw"]
 
 
 def random_motion(path: Path, seed: int, *, instants: int = 3) -> Path:
@@ -54,8 +54,8 @@ def compare_motion(path: Path, csv: Path) -> Verdict:
     start = time.process_time()
 
     def verdict(kind: str, said: str) -> Verdict:
-        end = time.process_time()
-        return Verdict(path=csv, kind=kind, said=said, seconds=(end - middle, middle - start), ours=None)
+        seconds = time.process_time() - middle, middle - start
+        return Verdict(path=csv, kind=kind, said=said, seconds=seconds, ours=None)
 
     middle = start
     try:
