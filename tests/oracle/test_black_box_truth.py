@@ -34,7 +34,7 @@ MARGINS = {  # ms in the posture, and where it rests
     EXAMPLES / "baxter.toml": (107.6918, 107.6918),
     CASES / "dampbest.toml": (52.2858, 52.8221),
     CASES / "mimic.toml": (420.842, 422.301),
-    CASES / "unclear_own_equilibrium.toml": (13.9376, 5.1275),
+    CASES / "unclear_own_equilibrium.toml": (13.93756, 5.127499),
 }
 
 

@@ -132,11 +132,9 @@ def read_design(path: str | Path) -> Design:
         contacts=tuple(
             (c["frame"], rows[c.get("kind", "point")]) for c in data.get("contacts", [])
         ),
-        feedback=data["controller"]["feedback"],
-        gravity=data["controller"].get("gravity", "feedback"),
-        tank_pays=all(
-            data["controller"].get(key, 1.0) > 0.0 for key in ("tank_energy_j", "tank_rate")
-        ),
+        feedback=law["feedback"],
+        gravity=law["gravity"],
+        tank_pays=all(law.get(key, 1.0) > 0.0 for key in ("tank_energy_j", "tank_rate")),
         torque_feedback_delay=_embedded_up(delays) if late else 0.0,
     )
 
