@@ -113,7 +113,7 @@ def motions() -> None:
         )
     system = sealag.load("bundled:hume")
     motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=7), rate=1600.0)
-    stack = system.evaluate(motion)
+    spaces = system.spaces(motion)
     start = time.perf_counter()
     certificate = sealag.certify(system, motion)
     own = time.perf_counter() - start
@@ -121,7 +121,7 @@ def motions() -> None:
     instants = np.linspace(0, len(motion) - 1, 5).astype(int)
     start = time.perf_counter()
     for k in instants:
-        task = stack.J_star[k], stack.stiffness[k], system.actuators.motor_damping
+        task = spaces.J_star[k], spaces.stiffness[k], system.actuators.motor_damping
         assert direct(*task) * (1 + 1e-5) >= certificate.bounds_s[k]
     peer = (time.perf_counter() - start) / len(instants)
     print(

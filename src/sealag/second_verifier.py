@@ -388,9 +388,10 @@ def main(path: str, show: Callable[[str], Any] = print) -> int:
     try:
         for claim, holds, detail in claims(read(path)):
             counts[(True, False, None).index(holds)] += 1
-            show(f"{words[holds]:14} {claim}{': ' if detail else ''}{detail}")
+            line = f"{words[holds]:14} {claim}{': ' if detail else ''}{detail}"
+            show("".join(filter(str.isprintable, line)))
     except (ArithmeticError, AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
-        show(f"no certificate: {type(error).__name__}: {str(error)[:200]}")
+        show(f"no certificate: {type(error).__name__}: {ascii(str(error))[:200]}")
         return 2
     show(f"{counts[0]} claims hold, {counts[1]} do not, {counts[2]} cannot be decided here")
     return 1 if counts[1] else 0

@@ -2,14 +2,16 @@
 
 import json
 import tomllib
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sealag.cli import main
-from sealag.design import load, resolve_project
+from sealag.cli._simulate import summary
+from sealag.delay import RoundTrip, Sinusoid
+from sealag.design import load, resolve_project, simulate
 from sealag.locomotion import WalkingGait, WalkingOptions
 from sealag.report import read_recording
 
@@ -182,3 +184,36 @@ def test_torque_limits_that_cannot_hold(tmp_path, capsys):
     code, _, err = run(capsys, path, "--out", tmp_path / "r.mcap")
     assert code == 2
     assert "cannot hold this posture" in err
+
+
+@pytest.mark.parametrize("duration", ["0.2", "0.201"])
+def test_the_largest_ages_are_the_certificate_s_wherever_it_ends(duration, capsys, tmp_path):
+    """ANYmal's links: 4 ms up, 5 ms down, and a hold of 2.5 ms that is no longer than that."""
+    code, text, _ = run(
+        capsys, EXAMPLES / "anymal.toml", "--duration", duration, "--json",
+        "--out", tmp_path / "run.mcap",
+    )  # fmt: skip
+    answer = json.loads(text)
+    assert code == 0
+    ages = [answer[f"{name}_age_s"] for name in ("measurement", "command", "total")]
+    np.testing.assert_allclose(ages, [4e-3, 7.5e-3, 11.5e-3], rtol=0, atol=1e-12)
+
+
+def test_the_largest_is_printed_and_not_the_mean_or_the_signed_maximum():
+    """Delays that vary; and a law that takes more than it gives."""
+    system = load(EXAMPLES / "baxter.toml")
+    wave = Sinusoid(mean=6e-3, amplitude=5e-3, angular_frequency=40.0)
+    result = simulate(
+        replace(system, delays=replace(system.delays, central=RoundTrip.halved(wave))),
+        scenario="balance",
+        duration=0.3,
+    )
+    answer = summary(result, Path("run.mcap"))
+    assert answer["measurement_age_s"] == result.ages.measurement
+    assert answer["measurement_age_s"] > 1.5 * result.measurement_age.mean()
+    assert answer["command_age_s"] >= result.command_age.max()
+    assert answer["total_age_s"] > answer["command_age_s"]
+    law = -np.abs(result.audit.law_injection)
+    turned = replace(result, audit=replace(result.audit, law_injection=law))
+    assert summary(turned, Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
+    assert answer["injection_error_j"] == result.audit.injection_error > 0.0

@@ -37,22 +37,22 @@ def _renamed(d):
 
 
 FORGED = {
-    "delay": ("baxter", "project: delay_s", lambda d: d.update(delay_s=0.001)),
-    "times": ("moving", "motion: times", _later),
-    "unproven bound": ("moving", "motion: bounds", _unproven_bound),
+    "delay": ("baxter", "design: delay_s", lambda d: d.update(delay_s=0.001)),
+    "times": ("moving", "design: time_s", _later),
+    "unproven bound": ("moving", "design: bounds_s", _unproven_bound),
     "published": (
         "baxter",
-        "motion: published_max_delay_s",
+        "design: published_max_delay_s",
         lambda d: d.update(published_max_delay_s=1.001 * d["published_max_delay_s"]),
     ),
     "urdf": ("baxter", "urdf file", lambda d: d["hashes"].update(urdf="0" * 64)),
     "project": ("moving", "project file", lambda d: d["hashes"].update(project="0" * 64)),
-    "feedback": ("moving", "project: feedback", lambda d: d.update(feedback="static_joint_tank")),
+    "feedback": ("moving", "design: feedback", lambda d: d.update(feedback="static_joint_tank")),
     "inertia": (
-        "baxter", "project: task_inertia", lambda d: d.update(task_inertia="lambda_star"),
+        "baxter", "design: task_inertia", lambda d: d.update(task_inertia="lambda_star"),
     ),
-    "levels": ("baxter", "project: levels", lambda d: d["levels"].__setitem__(1, 6)),
-    "joints": ("baxter", "project: joints", _renamed),
+    "levels": ("baxter", "design: levels", lambda d: d["levels"].__setitem__(1, 6)),
+    "joints": ("baxter", "design: joints", _renamed),
 }  # fmt: skip
 
 
@@ -67,7 +67,7 @@ def design(name):
 def test_a_certificate_of_the_design_holds(name):
     result = verify_design(made(name), *design(name), exact=name == "baxter")
     assert result.valid, [check for check in result.checks if not check.ok]
-    assert any(check.name == "motion: bounds" for check in result.checks)
+    assert any(check.name == "design: bounds_s" for check in result.checks)
 
 
 @pytest.mark.parametrize("name", FORGED)
@@ -84,13 +84,13 @@ def test_what_a_forger_may_reseal_is_found_with_the_project(name):
 def test_a_true_certificate_of_another_design_is_found():
     """Softer tasks, honestly certified, under the hashes of this project."""
     system, _ = design("baxter")
-    tasks = tuple(replace(task, stiffness=0.5 * task.stiffness) for task in system.hierarchy.tasks)
-    softer = replace(system, hierarchy=replace(system.hierarchy, tasks=tasks))
+    tasks = tuple(replace(task, stiffness=0.5 * task.stiffness) for task in system.law.tasks)
+    softer = replace(system, law=replace(system.law, tasks=tasks))
     data = plain(sealag.certify(softer))
     assert data["max_delay_s"] > 1.5 * made("baxter")["max_delay_s"]
     assert verify(data).valid
     failed = {check.name for check in verify_design(data, system).checks if not check.ok}
-    assert {"motion: bounds", "motion: J*, S, F at instant 0", "motion: local margin"} <= failed
+    assert {"design: bounds_s", "design: J*, S, F at instant 0", "design: local_margin_s"} <= failed
 
 
 def test_a_common_multiplier_that_fails_at_an_instant_without_proof_is_found():
@@ -102,7 +102,7 @@ def test_a_common_multiplier_that_fails_at_an_instant_without_proof_is_found():
     q[open_[0], -6:] *= 1.5
     data["hashes"] = resealed(data)["hashes"]
     failed = [c.name for c in verify_design(data, system, replace(motion, q=q)).checks if not c.ok]
-    assert f"motion: common multiplier at all {len(motion)} instants" in failed
+    assert f"design: common multiplier at all {len(motion)} instants" in failed
 
 
 def test_the_command(tmp_path, capsys):
@@ -125,14 +125,14 @@ def test_the_command(tmp_path, capsys):
     copy.write_text(BAXTER.read_text().replace("value_ms = 10.0", "value_ms = 20.0"))
     code, text, _ = run(out, "--project", copy)
     assert code == 1
-    assert "BAD  project: delay_s" in text
+    assert "BAD  design: delay_s" in text
     system, walk = design("moving")
     save_motion(walk, system.robot, motion)
     write_certificate(sealag.certify(system, walk), out)
     assert run(out, "--project", "bundled:hume", "--motion", motion)[0] == 0
     code, text, _ = run(out, "--project", "bundled:hume")
     assert code == 1
-    assert "BAD  motion: times: 40 in the certificate, 1 in the motion" in text
+    assert "BAD  design: time_s: 40 entries in the certificate, 1 computed anew" in text
     code, _, err = run(out, "--motion", motion)
     assert code == 2
     assert "--project" in err

@@ -13,7 +13,7 @@ from sealag.errors import CertificateError
 from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.passivity import content_digest, read_certificate, verify, write_certificate
 from sealag.robot import Motion
-from sealag.whole_body import Feedback
+from sealag.whole_body import Tank
 
 
 def plain(certificate: Any) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def _made(name: str) -> dict[str, Any]:
             sealag.certify(
                 replace(
                     system,
-                    feedback=Feedback.STATIC_JOINT_TANK,
+                    law=replace(system.law, signal=Tank()),
                     contacts=system.contacts[:1],
                     actuators=replace(
                         system.actuators, spring_stiffness=10.0 * system.actuators.spring_stiffness

@@ -56,3 +56,13 @@ def planar_arm(folder: Path, *, count: int, mass: float, inertia: float, length:
         length=length,
         along="x",
     )
+
+
+class Damped:
+    """A robot whose joints are damped on the links' side as given (n,), Nms/rad."""
+
+    def __init__(self, robot: Robot, damping) -> None:
+        self._robot, self.damping = robot, damping
+
+    def __getattr__(self, name: str):
+        return getattr(self._robot, name)

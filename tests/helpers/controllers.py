@@ -41,4 +41,4 @@ class StoringPD(JointPD):
         """Return V_3 and write the undelayed command."""
         self.tick(t, measurement, command)
         away = measurement.theta - self.target
-        return float(0.5 * self.stiffness * away @ away)
+        return float(0.5 * away @ (self.stiffness * away))

@@ -8,12 +8,13 @@ sees. It prints the growth over the ticks after the first ones, carried on to an
 import ctypes
 import resource
 import sys
+from dataclasses import replace
 
 import numpy as np
 
 from sealag.design import load
 from sealag.locomotion import FlatTerrain, begin_walk
-from sealag.whole_body import Controller, ControllerOptions, Measurement
+from sealag.whole_body import Controller, Measurement, Tank
 
 WARM, TICKS = 1_000, 10_000
 HOUR = 3_600_000
@@ -23,10 +24,9 @@ HOUR = 3_600_000
 def standing():
     """Return ANYmal's controller and what it measures."""
     system = load("examples/anymal.toml")
-    options = ControllerOptions(feedback="static_joint_tank", gravity=system.gravity)
     controller = Controller(
-        system.robot, system.hierarchy, system.actuators, contacts=system.contacts,
-        posture=system.posture, options=options,
+        system.robot, replace(system.law, signal=Tank()), system.actuators,
+        contacts=system.contacts, posture=system.posture,
     )  # fmt: skip
     return controller, _measured(system.robot, system.posture, np.zeros(system.robot.nv), 4)
 

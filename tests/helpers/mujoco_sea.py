@@ -48,16 +48,17 @@ def _axis(joint) -> tuple[str, str]:
     return kind, _numbers(joint.extract().axis if hasattr(joint, "extract") else joint.axis)
 
 
-def _body(model, index: int, sites: str, floating: bool) -> str:
+def _body(model, index: int, sites: str, floating: bool, bearing: dict[str, float]) -> str:
     """XML of the body behind a joint and of everything on it."""
     name = model.names[index]
     if floating and index == 1:
         joint = "<freejoint/>"
     else:
         kind, axis = _axis(model.joints[index])
-        joint = f'<joint name="{name}" type="{kind}" axis="{axis}"/>'
+        damping = f'damping="{bearing.get(name, 0.0):.17g}"'
+        joint = f'<joint name="{name}" type="{kind}" axis="{axis}" {damping}/>'
     children = "".join(
-        _body(model, child, sites, floating)
+        _body(model, child, sites, floating, bearing)
         for child in range(index + 1, model.njoints)
         if model.parents[child] == index
     )
@@ -80,8 +81,12 @@ def model_xml(
     integrator: str = "implicitfast",
     impedance: float = 0.9999,
     soft: float = 5e-4,
+    pushed: str | None = None,
 ) -> str:
-    """Return the MJCF of a robot: feet held by equalities, or each touching its plane of ground."""
+    """Return the MJCF of a robot: feet held by equalities, or each touching its plane of ground.
+
+    The last three controls are the force on the origin of the pushed frame, world axes.
+    """
     model = robot._model
     sites = []
     for k, foot in enumerate(feet):
@@ -96,8 +101,17 @@ def model_xml(
                     f'contype="{2**k}" conaffinity="0" mass="0"/>',
                 )
             )
+    forces = ""
+    if pushed is not None:
+        frame = model.frames[model.getFrameId(pushed)]
+        sites.append((frame.parentJoint, f'<site name="pushed" {_pose(frame.placement)}/>'))
+        forces = "".join(
+            f'<motor site="pushed" refsite="origin" gear="{_numbers(axis)} 0 0 0"/>'
+            for axis in np.eye(3)
+        )
     base = [i for i in range(1, model.njoints) if model.parents[i] == 0]
-    bodies = "".join(_body(model, i, sites, robot.floating_base) for i in base)
+    bearing = dict(zip(robot.joints, robot.damping.tolist()))
+    bodies = "".join(_body(model, i, sites, robot.floating_base, bearing) for i in base)
     rotors = "".join(
         f'<body name="rotor_{name}" pos="0 0 50"><inertial pos="0 0 0" mass="1e-6" '
         f'diaginertia="1e-12 1e-12 1e-12"/><joint name="rotor_{name}" axis="0 0 1" '
@@ -106,7 +120,8 @@ def model_xml(
         for i, name in enumerate(robot.joints)
     )
     springs = "".join(
-        f'<fixed stiffness="{actuators.spring_stiffness[i]:.17g}" springlength="0"><joint '
+        f'<fixed stiffness="{actuators.spring_stiffness[i]:.17g}" springlength="0" '
+        f'damping="{actuators.spring_damping[i]:.17g}"><joint '
         f'joint="rotor_{name}" coef="1"/><joint joint="{name}" coef="-1"/></fixed>'
         for i, name in enumerate(robot.joints)
     )
@@ -132,8 +147,9 @@ def model_xml(
         f'<option timestep="{step:.17g}" integrator="{integrator}" gravity="0 0 -9.81" '
         f'tolerance="1e-13" iterations="200" cone="elliptic" impratio="100">'
         f'<flag contact="{contact}" midphase="disable"/></option>'
-        f"<worldbody>{floor}{anchors}{bodies}{rotors}</worldbody><tendon>{springs}</tendon>"
-        f"<equality>{held}</equality><actuator>{motors}</actuator></mujoco>"
+        f'<worldbody><site name="origin" pos="0 0 0"/>'
+        f"{floor}{anchors}{bodies}{rotors}</worldbody><tendon>{springs}</tendon>"
+        f"<equality>{held}</equality><actuator>{motors}{forces}</actuator></mujoco>"
     )
 
 

@@ -160,11 +160,9 @@ def walk(kind: Any, path: str = "") -> set[str]:
         return walk(get_args(kind)[0], path)
     if get_origin(kind) in (Union, UnionType):
         return set().union(*(walk(part, path) for part in get_args(kind) if part is not type(None)))
-    if get_origin(kind) is dict and issubclass(get_args(kind)[1], BaseModel):
-        return walk(get_args(kind)[1], f"{path}.j1")
-    if get_origin(kind) is list and isinstance(get_args(kind)[0], type):
-        if issubclass(get_args(kind)[0], BaseModel):
-            return walk(get_args(kind)[0], path)
+    inner = get_args(kind)[-1] if get_origin(kind) in (dict, list) else None
+    if isinstance(inner, type) and issubclass(inner, BaseModel):
+        return walk(inner, f"{path}.j1" if get_origin(kind) is dict else path)
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         found = set()
         for name, field in kind.model_fields.items():

@@ -14,7 +14,7 @@ from sealag.cli._simulate import summary
 from sealag.design import load, simulate
 from sealag.errors import SealagError
 from sealag.simulation import Outcome
-from sealag.whole_body import Feedback, GravityCompensation
+from sealag.whole_body import SIGNAL_NAMES, GravityCompensation, signal_named
 
 NAMES = ("anymal", "anymal_crawl", "baxter", "hume_held", "talos")
 SCENARIOS = ("regulate", "track", "drop", "balance")
@@ -43,19 +43,22 @@ def _drawn(system, rng):
 
     tasks = tuple(
         replace(task, stiffness=factor(-2, 3) * np.asarray(task.stiffness))
-        for task in system.hierarchy.tasks
+        for task in system.law.tasks
     )
     motors = system.actuators
     return replace(
         system,
-        hierarchy=replace(system.hierarchy, tasks=tasks),
+        law=replace(
+            system.law,
+            tasks=tasks,
+            signal=signal_named(str(rng.choice(SIGNAL_NAMES))),
+            gravity=rng.choice(list(GravityCompensation)),
+        ),
         actuators=replace(
             motors,
             spring_stiffness=factor(-2, 1) * motors.spring_stiffness,
             motor_damping=factor(-3, 2) * motors.motor_damping,
         ),
-        feedback=rng.choice(list(Feedback)),
-        gravity=rng.choice(list(GravityCompensation)),
     )
 
 

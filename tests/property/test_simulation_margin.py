@@ -128,7 +128,8 @@ REST = 1000  # ticks after the last push
 def _pushed_arm(arm, bound, tick, *, pushes, seed):
     rng = np.random.default_rng(seed)
     delays = rough_delays(bound, tick)
-    network, clock = Network.from_delays(delays), Clock(physics=tick / 2, central=tick)
+    network = Network.from_delays(delays)
+    clock = Clock(physics=tick / 2, embedded=tick / 2, central=tick)
     assert network.delay_bound(clock) == pytest.approx(bound)
     away = rng.normal(0, 0.3, arm.robot.n)
     return closed_loop(
@@ -162,7 +163,7 @@ def _assert_passive(run):
 
 def _used(run, bound):
     """Oldest state behind a command at work, as a share of the bound."""
-    return float((run.measurement_age + run.command_age).max()) / bound
+    return run.ages.total / bound
 
 
 @pytest.mark.parametrize("seed", range(1, 40, 2))  # two joints each

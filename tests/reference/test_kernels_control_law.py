@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sealag.kernels.control_law import frame_error, law, leave_to_higher, static_step
+from sealag.kernels.control_law import (
+    frame_error,
+    gravity_slope,
+    law,
+    leave_to_higher,
+    static_step,
+)
 from sealag.kernels.operational_space import SYMMETRIC, allocate, memory_size, operational_space
 from sealag.robot import Contact, load_robot
-from sealag.whole_body import Hierarchy, Task, TaskKind
+from sealag.whole_body import Law, Task, TaskKind
 from sealag.whole_body._task_reader import read_tasks
 
 CONTACTS = (Contact(frame="left_foot"), Contact(frame="right_foot"))
@@ -76,33 +82,72 @@ def test_errors_of_lower_tasks_move_as_their_own_jacobian_says(levels):
         assert np.abs(J - space.J_star).max() > 0.1
 
 
+@pytest.mark.parametrize("plain", [False, True])
+@pytest.mark.parametrize("slope", [0.0, 1.0])
 @pytest.mark.parametrize("symmetric", [True, False])
-def test_static_step_is_newton_s(symmetric):
+def test_static_step_is_newton_s(symmetric, slope, plain):
+    """l(q̄) = J*ᵀ S x̃ + ḡ has the gradient −J*ᵀ S J + ∂ḡ/∂q, −J the errors' Jacobian."""
     rng = np.random.default_rng(8)
     m, n = 4, 6
     J, X = rng.normal(size=(m, n)), rng.normal(size=(m, m))
     S = X @ X.T if symmetric else X @ X.T + 0.3 * (X - X.T)
-    F = J.T @ S @ J
-    K = 1.5 * np.linalg.norm(F, 2) * rng.uniform(1.0, 2.0, n)
+    moved_by = J + 0.3 * rng.normal(size=(m, n)) if plain else J
+    F, G = J.T @ S @ moved_by, slope * 5.0 * rng.normal(size=(n, n))
+    K = 1.5 * np.linalg.norm(F - G, 2) * rng.uniform(1.0, 2.0, n)
     torque, sag = rng.normal(size=n), rng.normal(size=n)
     step, moved = np.zeros(n), sag.copy()
-    assert static_step(J, S, K, torque, moved, np.zeros((n, n)), step)
-    expected = np.linalg.solve(np.diag(K) - F, -K * sag - torque)
+    assert static_step(J, moved_by, S, G, K, torque, moved, np.zeros((n, n)), step)
+    expected = np.linalg.solve(np.diag(K) - F + G, -K * sag - torque)
     np.testing.assert_allclose(step, expected, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(moved, sag + expected, rtol=1e-9)
+    if slope:
+        without = np.linalg.solve(np.diag(K) - F, -K * sag - torque)
+        assert np.abs(step - without).max() > 1e-3 * np.abs(step).max()
+    if plain:
+        wrong = np.linalg.solve(np.diag(K) - J.T @ S @ J + G, -K * sag - torque)
+        assert np.abs(step - wrong).max() > 1e-3 * np.abs(step).max()
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_static_step_refuses_exactly_where_the_fixed_point_is_no_contraction(seed):
+@pytest.mark.parametrize("of", ["tasks", "gravity"])
+def test_static_step_refuses_exactly_where_the_fixed_point_is_no_contraction(seed, of):
+    """The largest eigenvalue of K^-½ (J*ᵀ S J* − ∂ḡ/∂q) K^-½ decides, whichever part it is of."""
     rng = np.random.default_rng(seed)
     J, X, K = rng.normal(size=(3, 5)), rng.normal(size=(3, 3)), rng.uniform(1.0, 9.0, 5)
     S, root = X @ X.T, np.sqrt(K)
-    factor = np.linalg.norm(J.T @ S @ J / np.outer(root, root), 2)
+    F = J.T @ S @ J
+    factor = np.linalg.norm(F / np.outer(root, root), 2)
     for share in (0.999, 1.001):
+        scaled = share / factor
+        task, slope = (S * scaled, 0.0 * F) if of == "tasks" else (0.0 * S, -F * scaled)
         exists = static_step(
-            J, S * (share / factor), K, np.zeros(5), np.zeros(5), np.zeros((5, 5)), np.zeros(5)
+            J, J, task, slope, K, np.zeros(5), np.zeros(5), np.zeros((5, 5)), np.zeros(5)
         )
         assert exists == (share < 1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_gravity_slope_is_that_of_the_potential_along_given_motions(seed):
+    """The symmetric part of ∂(Wᵀ g)/∂q W with W frozen, by central differences of g."""
+    robot, rng = load_robot("bundled:hume.urdf", floating_base=True), np.random.default_rng(seed)
+    posture = robot.configuration(0.3 * rng.normal(size=6))
+    q, W = robot.integrate(posture, 0.4 * rng.normal(size=12)), rng.normal(size=(12, 6))
+    at = robot.workspace()
+    at.update(q, np.zeros(12))
+    out = np.full((6, 6), np.nan)
+    gravity_slope(robot.tree, at.terms, W, np.zeros((12, 12)), np.zeros((12, 6)), out)
+
+    def force(step):
+        return W.T @ robot.gravity(robot.integrate(q, step))
+
+    h = 1e-5
+    expected = np.stack([(force(h * w) - force(-h * w)) / (2.0 * h) for w in W.T], axis=1)
+    expected = (expected + expected.T) / 2.0
+    np.testing.assert_allclose(out, expected, atol=1e-6 * np.abs(expected).max())
+    there = robot.integrate(q, 0.1 * rng.normal(size=12))
+    at.update(there, np.zeros(12))
+    gravity_slope(robot.tree, at.terms, W, np.zeros((12, 12)), np.zeros((12, 6)), out)
+    assert np.abs(out - expected).max() > 1e-2 * np.abs(expected).max(), "it must depend on q"
 
 
 def plain_law(robot, q, joints, along, offset):
@@ -132,7 +177,7 @@ def test_law_is_its_parts_one_after_the_other():
     posture = robot.configuration(np.deg2rad([2, -25, 55, -1, -30, 50]))
     WANTED.com, WANTED.joint = robot.center_of_mass(posture), posture[-4]
     WANTED.rotation = robot.frame_placement("torso", posture)[0]
-    hierarchy = Hierarchy(
+    chosen = Law(
         tasks=(
             Task(name="com", kind=TaskKind.COM, stiffness=GAINS[:3]),
             Task(name="turn", kind=TaskKind.ORIENTATION, frame="torso", stiffness=GAINS[3:6]),
@@ -142,7 +187,7 @@ def test_law_is_its_parts_one_after_the_other():
             ),
         )
     )  # fmt: skip
-    frames, tasks = read_tasks(robot, hierarchy, CONTACTS, posture=posture)
+    frames, tasks = read_tasks(robot, chosen, CONTACTS, posture=posture)
     q, offset = robot.integrate(posture, 0.05 * rng.normal(size=12)), 0.01 * rng.normal(size=7)
     joints, along = q[-6:] + 0.02 * rng.normal(size=6), rng.normal(size=(12, 6))
     count, sizes, out = len(frames), (12, 6, 6, 7), np.zeros(6)

@@ -7,17 +7,20 @@ from scipy.linalg import expm
 
 from sealag.kernels import motor
 
-COLUMNS = ("K", "D_s", "B", "ratio", "D", "viscous", "coulomb", "limit", "speed", "bandwidth")
+COLUMNS = (
+    "K", "D_s", "B", "ratio", "D", "viscous", "coulomb", "limit", "speed", "bandwidth", "bearing",
+)  # fmt: skip
 
 
 def parameters(**changes):
-    values = dict(zip(COLUMNS, (350.0, 0.5, 0.093, 2.0, 100.0, 0.2, 0.0, np.inf, np.inf, np.inf)))
+    ideal = (np.inf,) * 3
+    values = dict(zip(COLUMNS, (350.0, 0.5, 0.093, 2.0, 100.0, 0.2, 0.0, *ideal, 0.0)))
     return np.array([[{**values, **changes}[name] for name in COLUMNS]])
 
 
 def reference_matrix(p, instant, variant):
     """A of ż = A z and the five products' rows, written out from Eqs. (5)-(8)."""
-    K, D_s, B, ratio, D, viscous, _, _, _, bandwidth = p
+    K, D_s, B, ratio, D, viscous, _, _, _, bandwidth, _ = p
     e = np.eye(9)
     theta, omega, torque, q, q1, q2, q3, u, w = e
     spring = K * (theta - q) + D_s * (omega - q1)
@@ -61,7 +64,7 @@ def test_exponentials_and_works(variant, bandwidth, step):
 def _move(p, z, tau, step, regular, instant=1.0, measured=0.0):
     n = len(p)
     half, whole = np.empty((n, 4, 9, 9)), np.empty((n, 4, 9, 9))
-    forms, work = np.empty((n, 4, 5, 9, 9)), np.zeros((n, 7))
+    forms, work = np.empty((n, 4, 5, 9, 9)), np.zeros((n, 8))
     motor.tables(p, instant, step, half, whole, forms)
     tau, measured = np.full(n, tau), np.full(n, measured)
     motor.move(p, instant, tau, measured, z, step, whole, forms, regular, True, work)
@@ -70,7 +73,7 @@ def _move(p, z, tau, step, regular, instant=1.0, measured=0.0):
 
 def _simulate(p, z, tau, step, instant=1.0, measured=0.0):
     """The same joint by an adaptive integrator, friction and limits evaluated as they come."""
-    K, D_s, B, ratio, D, viscous, coulomb, limit, _, _ = p[0]
+    K, D_s, B, ratio, D, viscous, coulomb, limit, _, _, _ = p[0]
 
     def rate(t, x):
         q = z[3] + z[4] * t + z[5] * t**2 / 2 + z[6] * t**3 / 6
@@ -123,15 +126,49 @@ def test_coulomb_friction_holds_and_lets_go():
     assert gone[0, 0] > 0.0
 
 
-def test_velocity_limit_takes_away_driving_torque():
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_velocity_limit_takes_away_driving_torque(way):
     p = parameters(speed=1.0, D=0.1, D_s=0.0, viscous=0.0, K=1e-6)
     z = np.zeros((1, 9))
-    z[0, 1] = 1.5
-    moved, work = _move(p, z, 50.0, 1e-3, True)
-    assert moved[0, 1] == pytest.approx(1.5, abs=1e-6)
+    z[0, 1] = 1.5 * way
+    moved, work = _move(p, z, 50.0 * way, 1e-3, True)
+    assert moved[0, 1] == pytest.approx(1.5 * way, abs=1e-6)
     assert abs(work[0, 4]) < 1e-9
-    braking, _ = _move(p, moved.copy(), -50.0, 1e-3, True)
-    assert braking[0, 1] < 1.5
+    braking, _ = _move(p, moved.copy(), -50.0 * way, 1e-3, True)
+    assert abs(braking[0, 1]) < 1.5
+    z[0, 1] = 0.5 * way  # below the limit the motor drives
+    driven, _ = _move(p, z, 50.0 * way, 1e-3, True)
+    assert driven[0, 1] * way > 0.5
+
+
+def test_link_work_is_the_integral_of_its_squared_speed():
+    rng, z, work, step = np.random.default_rng(4), np.zeros((2, 9)), np.zeros((2, 8)), 3e-3
+    ends = rng.normal(size=(4, 2))
+    motor.link_cubic(z, *ends, step)
+    motor.add_link_work(z, step, work)
+    for row, done, end in zip(z, work[:, 7], ends[3]):
+        speed = np.polynomial.Polynomial([row[4], row[5], row[6] / 2])
+        assert done == pytest.approx(quad(lambda t, v=speed: v(t) ** 2, 0, step)[0], rel=1e-12)
+        assert speed(step) == pytest.approx(end)
+    assert not work[:, :7].any()
+
+
+def test_tally_weighs_every_work_with_its_own_coefficient():
+    """Nine flows of two joints, all different: D_θ, friction, D_s and bearing where they belong."""
+    rng = np.random.default_rng(5)
+    p, work, z, q = rng.uniform(1, 2, (2, 11)), rng.uniform(1, 2, (2, 8)), np.zeros((2, 9)), [0, 0]
+    joint, scalar, energy = np.zeros((9, 2)), np.zeros(5), np.zeros(4)
+    powers = rng.uniform(1, 2, (4, 6))
+    motor.tally(p, work, powers, 0.6, z, np.array(q, float), powers[0], joint, scalar, energy,
+                np.zeros(1))  # fmt: skip
+    w, one = work.T, np.ones(2)
+    expected = np.array(
+        [one * w[1], w[2], w[4], w[6], p[:, 4] * w[0], p[:, 5] * w[0], p[:, 6] * w[5],
+         p[:, 1] * w[3], p[:, 10] * w[7]]
+    )  # fmt: skip
+    np.testing.assert_allclose(joint, expected)
+    simpson = np.array([1, 2, 2, 1]) @ powers[:, :4] / 6 * 0.6
+    np.testing.assert_allclose(scalar, [*simpson, 0.0])
 
 
 def test_late_torque_feedback_is_held():

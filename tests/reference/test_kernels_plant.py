@@ -51,7 +51,7 @@ def test_a_step_against_an_adaptive_integrator(plant):
             rate, (0, STEP / pieces), x, args=(q, v), rtol=1e-10, atol=1e-12
         ).y[:, -1]  # fmt: skip
         q, x = robot.integrate(q, 0.5 * STEP / pieces * (v + end[:12])), end
-    plant.step(tau)
+    plant.advance(STEP, tau)
     np.testing.assert_allclose(plant.q, q, atol=1e-8)
     np.testing.assert_allclose(plant.v, x[:12], atol=1e-6)
     np.testing.assert_allclose(plant.theta, x[12:18], atol=1e-8)
@@ -70,4 +70,4 @@ def test_irregular_steps_are_the_same_steps(plant):
     )  # fmt: skip
     np.testing.assert_allclose(plant._next.data, regular, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(plant._work, work, rtol=1e-9, atol=1e-12)
-    assert (np.abs(work[:, :5]).max(axis=0) > 0.0).all()
+    assert (np.abs(work).max(axis=0) > 0.0).all()

@@ -1,5 +1,7 @@
 """Actuators, transparency and delay signals against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -95,6 +97,88 @@ def test_jitter_and_losses_count():
         Delays(**plain, embedded_period=0.003)
     with pytest.raises(InputError, match="factor"):
         looks.scaled(-1.0)
+
+
+def test_every_part_of_d_1_and_d_2_counts_once():
+    """Loss, jitter, bursts, periods and scale together, each link its own; then one part less."""
+    late = {"up": (1e-3, 2e-4, 2), "down": (3e-3, 5e-4, 3), "drive": (7e-4, 3e-4, 5)}
+    link = {
+        name: Link(delay=Constant(d), jitter=j, loss=0.1, max_burst=b)
+        for name, (d, j, b) in late.items()
+    }
+    unheard = Link(delay=Constant(0.4), jitter=0.4, loss=0.5, max_burst=9)  # torque's way up
+
+    def both(period, scale=1.0, **changed):
+        ways = {**link, **changed}
+        delays = Delays(
+            central=RoundTrip(up=ways["up"], down=ways["down"]),
+            embedded=RoundTrip(up=unheard, down=ways["drive"]),
+            sample_time=2e-3,
+            embedded_period=period,
+        )
+        delays = delays if scale == 1.0 else delays.scaled(scale)
+        return np.array([delays.d_1 - delays.d_2, delays.d_2])
+
+    # Up and drive send at the embedded period, the master at the central one; three waits.
+    np.testing.assert_allclose(
+        both(5e-4),
+        [1.2e-3 + 2 * 5e-4 + 5e-4, 3.5e-3 + 3 * 2e-3 + 1e-3 + 5 * 5e-4 + 2e-3 + 2 * 5e-4],
+        rtol=1e-12,
+    )
+    # Without an embedded period all of them send once a central period, and nobody waits.
+    np.testing.assert_allclose(
+        both(0.0), [1.2e-3 + 2 * 2e-3, 3.5e-3 + 1e-3 + (3 + 5 + 1) * 2e-3], rtol=1e-12
+    )
+    # A scale takes delays and jitter along, neither periods nor bursts.
+    np.testing.assert_allclose(
+        both(0.0, scale=3.0),
+        [3 * 1.2e-3 + 2 * 2e-3, 3 * (3.5e-3 + 1e-3) + (3 + 5 + 1) * 2e-3],
+        rtol=1e-12,
+    )
+    whole = both(5e-4)
+    for name, way in (("up", 0), ("down", 1), ("drive", 1)):
+        for key, value, less in (
+            ("jitter", 0.0, late[name][1]),
+            ("delay", Constant(0.0), late[name][0]),
+            ("max_burst", late[name][2] - 1, 2e-3 if name == "down" else 5e-4),
+        ):
+            gained = whole - both(5e-4, **{name: replace(link[name], **{key: value})})
+            assert gained[way] == pytest.approx(less), (name, key)
+            assert gained[1 - way] == 0.0
+
+
+def test_packets_taken_as_they_come_count_as_overtaken():
+    falling = Sinusoid(mean=0.01, amplitude=0.002, angular_frequency=100.0)  # 0.2 s/s
+    link = Link(delay=falling, jitter=1e-3, order=PacketOrder.ARRIVAL)
+    assert link.late_bound(0.0) == pytest.approx(0.012 + 1e-3 + 1e-3 / 0.8)
+    steep = Link(delay=replace(falling, angular_frequency=600.0), order=PacketOrder.ARRIVAL)
+    assert steep.late_bound(0.0) == pytest.approx(0.012 + 0.004)
+    plain = Delays(central=RoundTrip(up=link, down=link), embedded=Constant(0.0))
+    after = replace(plain, embedded=RoundTrip(up=link, down=link))
+    grid = {"sample_time": 2e-3, "embedded_period": 1e-3}
+    waits = replace(after, **grid).d_1 - replace(plain, **grid).d_1
+    assert waits == pytest.approx(link.late_bound(0.0))
+    # without a period of their own packets leave the master when they come: they may overtake more
+    assert after.d_1 - plain.d_1 == pytest.approx(link.late_bound(0.0) + link.spread)
+
+
+def test_bounds_of_every_signal():
+    table = Table(time=np.array([0.0, 1.0, 3.0]), delay=np.array([0.01, 0.03, 0.01]))
+    wave = Sinusoid(mean=0.02, amplitude=0.01, angular_frequency=-3.0)
+    trip = RoundTrip(up=Link(delay=table), down=Link(delay=wave)).scaled(2.0)
+    for signal, lower, upper, fall in (
+        (Constant(0.02), 0.02, 0.02, 0.0),
+        (wave, 0.01, 0.03, 0.03),
+        (table, 0.01, 0.03, 0.01),
+        (trip, 0.04, 0.12, 0.08),
+    ):
+        assert signal.lower_bound == pytest.approx(lower)
+        assert signal.upper_bound == pytest.approx(upper)
+        assert signal.steepest_fall == pytest.approx(fall)
+        t = np.linspace(-1.0, 4.0, 5001)
+        values = signal.at(t)
+        assert lower - 1e-12 <= values.min() <= values.max() <= upper + 1e-12
+        assert np.diff(values).min() / (t[1] - t[0]) >= -fall - 1e-9
 
 
 def test_table_and_samples():

@@ -29,7 +29,7 @@ def with_loop(A_0, A_1, *, crossing, frequency, unstable=0, embedded=None):
     loop = {
         "A_0": A_0.tolist(), "A_1": A_1.tolist(), "A_e": None if A_e is None else A_e.tolist(),
         "embedded_delay_s": delay, "symmetries": [], "frequency_rad_s": frequency,
-        "states": [f"x{k}" for k in range(len(A_0))],
+        "states": [f"x{k}" for k in range(len(A_0))], "at": "posture",
     }  # fmt: skip
     margin = 0.0 if unstable else crossing
     data.update(
@@ -47,7 +47,7 @@ def answers(data):
 def plants(count):
     seed, found = 0, 0
     while found < count:
-        plant = random_sea_plant(seed, joints=3, feedback="motor")
+        plant = random_sea_plant(seed, joints=3, signal="motor")
         seed += 1
         if plant.symmetries.size:
             continue

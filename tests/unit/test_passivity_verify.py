@@ -270,12 +270,8 @@ def test_infinite_bounds_are_certified_without_numbers(criterion):
     from dataclasses import replace
 
     system = sealag.load("examples/baxter.toml")
-    tasks = tuple(replace(task, stiffness=0.0 * task.stiffness) for task in system.hierarchy.tasks)
-    system = replace(
-        system,
-        hierarchy=replace(system.hierarchy, tasks=tasks),
-        gravity=type(system.gravity)("planned"),
-    )
+    tasks = tuple(replace(task, stiffness=0.0 * task.stiffness) for task in system.law.tasks)
+    system = replace(system, law=replace(system.law, tasks=tasks, gravity="planned"))
     data = plain(sealag.certify(system, criterion=criterion))
     assert data["max_delay_s"] == data["max_delay_upper_s"] == "unbounded"
     assert data["status"] == "certified"

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from helpers.chains import wheel
+from helpers.chains import planar_arm, wheel
 from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD, StoringPD
 from sealag.actuation import actuators
@@ -209,6 +209,31 @@ class TestPassivityObserver:
         assert 0.1 < side.first_violation < 3.0
         assert not run.audit.delay_side.passive
         assert run.audit.joint_side.passive  # springs and motors are, whatever drives them
+
+    @pytest.mark.parametrize("guilty", [0, 1])
+    def test_the_joint_that_delivers_is_named(self, tmp_path, guilty):
+        """Two joints that hardly feel each other, one of them ten times too stiff for its delay."""
+        robot = planar_arm(tmp_path, count=2, mass=1e-3, inertia=1.0, length=1e-3)
+        stiffness = np.full(2, 5.0)
+        stiffness[guilty] = 100.0
+        springs = actuators(
+            robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=[10.0, 8.0]
+        )
+        none = Link(delay=Constant(value=0.0))
+        run = closed_loop(
+            robot,
+            springs,
+            StoringPD(np.zeros(2), stiffness=stiffness, motor=True),
+            q=np.array([0.3, 0.3]),
+            theta=np.array([0.3, 0.3]),
+            duration=3.0,
+            network=Network(
+                central_up=none, central_down=Link(delay=Constant(0.3)), embedded_down=none
+            ),
+        )
+        for side in (run.audit.controller_side, run.audit.delay_side):
+            assert not side.passive
+            assert side.joint == f"joint{guilty}"
 
     def test_no_statement_without_storage(self, tmp_path):
         robot = wheel(tmp_path)

@@ -1,4 +1,4 @@
-"""What is certified is what runs: the controller's ticks against `evaluate` and its own storage."""
+"""What is certified is what runs: the controller's ticks against `Spaces` and its own storage."""
 
 import gc
 import subprocess
@@ -13,23 +13,25 @@ from helpers.chains import planar_arm
 from sealag.actuation import actuators
 from sealag.design import load
 from sealag.errors import ContractionError, InputError, UnknownNameError
-from sealag.robot import Contact, Motion
+from sealag.robot import Contact
 from sealag.whole_body import (
+    SIGNAL_NAMES,
     Controller,
-    ControllerOptions,
-    Feedback,
     GravityCompensation,
-    Hierarchy,
+    Law,
+    LinkAngles,
     Measurement,
+    MotorAngles,
+    StaticJoint,
     StiffnessForm,
     StoringController,
+    Tank,
     Task,
     TaskError,
     TaskKind,
     TickController,
-    evaluate,
-    passive_stiffness,
     relative_asymmetry,
+    signal_named,
 )
 
 ANYMAL = load("examples/anymal.toml")
@@ -44,31 +46,34 @@ STANCES = {
 AGREE = 1e-6  # of the largest entry: rounding and truncation of two central differences
 
 
-def build(system, contacts, *, hierarchy=None, motors=None, reference=None, **options):
-    options = {"feedback": Feedback.MOTOR, "gravity": GravityCompensation.NONE, **options}
+def settling(name):
+    """A signal by its word, with enough iterations to settle in one tick."""
+    signal = signal_named(name)
+    return (
+        signal if isinstance(signal, MotorAngles | LinkAngles) else replace(signal, iterations=20)
+    )
+
+
+def running(system, changes):
+    """The design's law, with motor angles and no compensation unless told otherwise."""
+    return replace(system.law, **{"signal": MotorAngles(), "gravity": "none", **changes})
+
+
+def build(system, contacts, *, motors=None, reference=None, delay_bound=0.0, **changes):
     return Controller(
         system.robot,
-        hierarchy or system.hierarchy,
+        running(system, changes),
         motors or system.actuators,
         contacts=tuple(contacts),
         posture=system.posture,
-        options=ControllerOptions(**options),
+        delay_bound=delay_bound,
         reference=reference,
     )
 
 
-def certified(system, contacts, *, hierarchy=None, feedback=Feedback.MOTOR, gravity="none"):
-    still = Motion(
-        time=np.zeros(1),
-        q=system.posture[None],
-        v=np.zeros((1, system.robot.nv)),
-        contact_sets=(tuple(contacts),),
-        contact_index=np.zeros(1, dtype=np.int64),
-    )
-    return evaluate(
-        system.robot, hierarchy or system.hierarchy, system.actuators,
-        motion=still, feedback=feedback, gravity=GravityCompensation(gravity),
-    )  # fmt: skip
+def certified(system, contacts, **changes):
+    design = replace(system, law=running(system, changes), contacts=tuple(contacts))
+    return design.spaces()
 
 
 def at_posture(system, *, torque=None):
@@ -82,15 +87,21 @@ def at_posture(system, *, torque=None):
     return measured
 
 
-def without_errors(system, controller, stack):
+def without_errors(system, controller, spaces):
     """The state whose fed-back configuration is the posture, where all task errors are 0."""
-    options = controller.options
-    at_q_bar = options.feedback is Feedback.STATIC_JOINT or (
-        options.feedback is Feedback.STATIC_JOINT_TANK
-        and options.gravity is GravityCompensation.PLANNED
+    law = controller.law
+    at_q_bar = isinstance(law.signal, StaticJoint) or (
+        isinstance(law.signal, Tank) and law.gravity is GravityCompensation.PLANNED
     )
-    carried = at_q_bar and options.gravity is not GravityCompensation.NONE
-    return at_posture(system, torque=stack.gravity[0] if carried else None)
+    carried = at_q_bar and law.gravity is not GravityCompensation.NONE
+    return at_posture(system, torque=spaces.gravity[0] if carried else None)
+
+
+def without_task_error(controller):
+    """Let x̂ of a tank be the posture's, where the tasks have no error; others have no memory."""
+    tank = getattr(controller._signal, "_tank", None)
+    if tank is not None:
+        tank.position[:] = 0.0
 
 
 def stiffness_that_runs(controller, measured, *, column=None, step=1e-5):
@@ -102,7 +113,7 @@ def stiffness_that_runs(controller, measured, *, column=None, step=1e-5):
             measured.data[:] = rest
             controller.reset(0.0, measured)
             controller.tick(0.0, measured, out)
-            controller._tank.position[:] = 0.0
+            without_task_error(controller)
             if column is None:
                 measured.theta[j] += sign * step
             else:
@@ -115,44 +126,39 @@ def stiffness_that_runs(controller, measured, *, column=None, step=1e-5):
 
 @pytest.mark.parametrize("form", list(StiffnessForm))
 @pytest.mark.parametrize("gravity", list(GravityCompensation))
-@pytest.mark.parametrize("feedback", list(Feedback))
+@pytest.mark.parametrize("signal", SIGNAL_NAMES)
 @pytest.mark.parametrize("stance", STANCES)
-def test_certified_stiffness_is_the_derivative_of_the_command(stance, feedback, gravity, form):
+def test_certified_stiffness_is_the_derivative_of_the_command(stance, signal, gravity, form):
     system, contacts = STANCES[stance]
-    hierarchy = replace(system.hierarchy, form=form)
-    stack = certified(system, contacts, hierarchy=hierarchy, feedback=feedback, gravity=gravity)
-    controller = build(
-        system, contacts, hierarchy=hierarchy, feedback=feedback, gravity=gravity,
-        static_iterations=20,
-    )  # fmt: skip
-    measured, column = without_errors(system, controller, stack), None
-    if feedback is Feedback.JOINT:
+    changes = {"stiffness_form": form, "signal": settling(signal), "gravity": gravity}
+    spaces = certified(system, contacts, **changes)
+    controller = build(system, contacts, **changes)
+    measured, column = without_errors(system, controller, spaces), None
+    if signal == "joint":
         # Link angles move with the base, as the contacts allow it.
         controller.reset(0.0, measured)
-        along = controller._space.joint_from_base.copy()
+        along = controller._law.space.joint_from_base.copy()
 
         def column(j, step):
             return system.robot.integrate(system.posture, step * along[:, j])
 
     F = stiffness_that_runs(controller, measured, column=column)
-    certain = stack.F_theta[0]
+    certain = spaces.F_theta[0]
     np.testing.assert_allclose(F, certain, atol=AGREE * np.abs(certain).max())
-    if feedback is Feedback.STATIC_JOINT:
-        assert np.abs(F - stack.F_q[0]).max() > 0.05 * np.abs(certain).max(), "not that of x(θ)"
+    if signal == "static_joint":
+        assert np.abs(F - spaces.F_q[0]).max() > 0.05 * np.abs(certain).max(), "not that of x(θ)"
 
 
 def test_plain_errors_of_lower_tasks_run_another_stiffness_than_the_certified():
     """The printed x̃_2 also answers to what task 1 moves: no potential, however symmetric S is."""
-    stack = certified(BAXTER, ())
+    spaces = certified(BAXTER, ())
     F = stiffness_that_runs(build(BAXTER, (), task_error=TaskError.PLAIN), at_posture(BAXTER))
-    assert np.abs(F - stack.F_theta[0]).max() > 0.02 * np.abs(F).max()
+    assert np.abs(F - spaces.F_theta[0]).max() > 0.02 * np.abs(F).max()
     assert relative_asymmetry(F) > 1e-3
-    first, S = stack.levels[1], stack.stiffness[0]
-    alone = replace(
-        BAXTER.hierarchy, tasks=tuple(replace(t, priority=1) for t in BAXTER.hierarchy.tasks)
-    )
-    J_all = certified(BAXTER, (), hierarchy=alone).J_star[0]
-    J = stack.J_star[0]
+    first, S = spaces.levels[1], spaces.stiffness[0]
+    alone = tuple(replace(t, priority=1) for t in BAXTER.law.tasks)
+    J_all = certified(BAXTER, (), tasks=alone).J_star[0]
+    J = spaces.J_star[0]
     expected = J[:first].T @ S[:first, :first] @ J[:first]
     expected += J[first:].T @ S[first:, first:] @ J_all[first:]
     np.testing.assert_allclose(F, expected, atol=AGREE * np.abs(F).max())
@@ -174,7 +180,7 @@ def response_to_free_motions(system, contacts, **options):
     robot = system.robot
     J_s = robot.contact_jacobian(contacts, system.posture)
     Z = np.linalg.svd(J_s)[2][np.linalg.matrix_rank(J_s) :].T
-    controller, out = build(system, contacts, static_iterations=20, **options), np.zeros(robot.n)
+    controller, out = build(system, contacts, **options), np.zeros(robot.n)
     still = certified(system, contacts, **{k: options[k] for k in ("gravity",) if k in options})
     measured, response = without_errors(system, controller, still), np.zeros((robot.n, Z.shape[1]))
     rest = measured.data.copy()
@@ -195,18 +201,16 @@ def test_command_depends_on_motor_angles_alone_where_they_say_where_the_robot_is
 
 
 @pytest.mark.parametrize("gravity", list(GravityCompensation))
-@pytest.mark.parametrize(
-    ("feet", "feedback"), [(1, Feedback.MOTOR), (1, Feedback.STATIC_JOINT), (2, Feedback.MOTOR)]
-)
-def test_passive_stiffness_is_the_response_to_passive_motions(feet, feedback, gravity):
+@pytest.mark.parametrize(("feet", "signal"), [(1, "motor"), (1, "static_joint"), (2, "motor")])
+def test_derivative_contains_the_response_to_passive_motions(feet, signal, gravity):
     """One point foot leaves three passive motions, two leave one."""
     contacts = ONE_FOOT if feet == 1 else HUME.contacts
-    response, Z = response_to_free_motions(HUME, contacts, feedback=feedback, gravity=gravity)
-    F = passive_stiffness(
-        HUME.robot, HUME.hierarchy, HUME.actuators, q=HUME.posture, contacts=contacts,
-        feedback=feedback, gravity=gravity,
-    )  # fmt: skip
-    np.testing.assert_allclose(F @ Z, response, atol=1e-5 * np.abs(response).max())
+    law = {"signal": settling(signal), "gravity": gravity}
+    response, Z = response_to_free_motions(HUME, contacts, **law)
+    controller, spaces = build(HUME, contacts, **law), certified(HUME, contacts, **law)
+    theta = without_errors(HUME, controller, spaces).theta
+    found = controller._signal.derivative(HUME.posture, theta).C_q @ Z
+    np.testing.assert_allclose(found, -response, atol=1e-5 * np.abs(response).max())
     assert np.abs(response).max() > 1.0
 
 
@@ -227,21 +231,21 @@ def gradient(controller, measured, step=1e-4):
 
 
 @pytest.mark.parametrize("gravity", list(GravityCompensation))
-@pytest.mark.parametrize("feedback", [f for f in Feedback if f is not Feedback.JOINT])
+@pytest.mark.parametrize("signal", [name for name in SIGNAL_NAMES if name != "joint"])
 @pytest.mark.parametrize("stance", STANCES)
-def test_storage_is_the_potential_of_the_command(stance, feedback, gravity):
+def test_storage_is_the_potential_of_the_command(stance, signal, gravity):
     """To first order in the task error: what is left falls with its square."""
     system, contacts = STANCES[stance]
-    controller = build(system, contacts, feedback=feedback, gravity=gravity, static_iterations=20)
-    stack = certified(system, contacts, gravity=gravity)
+    controller = build(system, contacts, signal=settling(signal), gravity=gravity)
+    spaces = certified(system, contacts, gravity=gravity)
     away = np.random.default_rng(2).normal(size=system.robot.n)
-    rest, out = without_errors(system, controller, stack), np.zeros(len(away))
+    rest, out = without_errors(system, controller, spaces), np.zeros(len(away))
     error, change = [], []
     for scale in (2e-3, 1e-3):
-        measured = without_errors(system, controller, stack)
+        measured = without_errors(system, controller, spaces)
         controller.reset(0.0, rest)
         controller.tick(0.0, rest, out)
-        controller._tank.position[:] = 0.0
+        without_task_error(controller)
         still = out.copy()
         measured.theta[:] += scale * away
         for _ in range(3):  # the matrices of the fed-back configuration settle
@@ -251,17 +255,17 @@ def test_storage_is_the_potential_of_the_command(stance, feedback, gravity):
     now = np.zeros_like(out)
     controller.storage(0.0, measured, now)
     np.testing.assert_allclose(now, out, atol=1e-6 * np.abs(out).max())
-    if stack.asymmetry[0] < 1e-8:
+    if spaces.asymmetry[0] < 1e-8:
         assert error[1] < 0.02 * change[1]
         assert error[1] < 0.35 * error[0]
     else:  # compensation that presses the feet apart has no potential
-        assert error[1] < 3.0 * stack.asymmetry[0] * change[1]
+        assert error[1] < 3.0 * spaces.asymmetry[0] * change[1]
 
 
 def test_storage_of_motor_angles_is_not_that_of_the_static_joint_state():
     measured, out = at_posture(BAXTER), np.zeros(BAXTER.robot.n)
     measured.theta[:] += 1e-3
-    static = build(BAXTER, (), feedback=Feedback.STATIC_JOINT, static_iterations=20)
+    static = build(BAXTER, (), signal=StaticJoint(iterations=20))
     static.reset(0.0, measured)
     static.tick(0.0, measured, out)
     right = np.abs(gradient(static, measured) + out).max()
@@ -271,13 +275,14 @@ def test_storage_of_motor_angles_is_not_that_of_the_static_joint_state():
 
 
 def test_storage_and_tank_are_told_apart():
-    controller = build(BAXTER, (), feedback=Feedback.STATIC_JOINT_TANK, tank_energy=3.0)
+    controller = build(BAXTER, (), signal=Tank(energy=3.0))
     measured = at_posture(BAXTER)
     controller.reset(0.0, measured)
     controller.tick(0.0, measured, np.zeros(BAXTER.robot.n))
     assert controller.tank_energy == 3.0
     assert stored(controller, measured) == pytest.approx(3.0, abs=1e-12)
-    motor = build(BAXTER, (), tank_energy=3.0)
+    motor = build(BAXTER, ())
+    assert motor.tank_energy == 0.0
     assert stored(motor, measured) == pytest.approx(0.0, abs=1e-12)
 
 
@@ -295,9 +300,9 @@ def wander(system, ticks, seed=3):
         yield measured
 
 
-@pytest.mark.parametrize("feedback", list(Feedback))
-def test_reset_makes_runs_repeatable_and_storage_leaves_no_trace(feedback):
-    controller = build(ANYMAL, ANYMAL.contacts, feedback=feedback, delay_bound=0.01)
+@pytest.mark.parametrize("signal", SIGNAL_NAMES)
+def test_reset_makes_runs_repeatable_and_storage_leaves_no_trace(signal):
+    controller = build(ANYMAL, ANYMAL.contacts, signal=signal_named(signal), delay_bound=0.01)
 
     def run(*, watched, again=True):
         commands = []
@@ -313,7 +318,7 @@ def test_reset_makes_runs_repeatable_and_storage_leaves_no_trace(feedback):
     first = run(watched=False)
     np.testing.assert_array_equal(first, run(watched=True))
     assert np.abs(np.diff(first, axis=0)).max() > 0.1
-    if feedback in (Feedback.STATIC_JOINT, Feedback.STATIC_JOINT_TANK):
+    if signal in ("static_joint", "static_joint_tank"):
         assert not np.array_equal(first, run(watched=False, again=False)), "memory must show"
 
 
@@ -325,12 +330,12 @@ def test_it_is_both_protocols_and_runs_without_the_simulator():
 import sys, numpy as np
 from sealag.actuation import actuators
 from sealag.robot import load_robot
-from sealag.whole_body import Controller, Hierarchy, Measurement, Task, TaskKind
+from sealag.whole_body import Controller, Law, Measurement, Task, TaskKind
 robot = load_robot("bundled:hume", floating_base=True)
 motors = actuators(robot.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
 task = Task(name="com", kind=TaskKind.COM, stiffness=100.0)
 posture = robot.configuration(np.full(robot.n, 0.2), base_position=(0, 0, 0.9))
-controller = Controller(robot, Hierarchy(tasks=(task,)), motors, contacts=(), posture=posture)
+controller = Controller(robot, Law(tasks=(task,)), motors, posture=posture)
 measured = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n)
 command = np.zeros(robot.n)
 measured.q[:], measured.theta[:] = posture, 0.25
@@ -378,18 +383,16 @@ def growth(controller, robot, ticks):
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("feedback", list(Feedback))
-def test_memory_stays_flat(tmp_path, feedback):
+@pytest.mark.parametrize("signal", SIGNAL_NAMES)
+def test_memory_stays_flat(tmp_path, signal):
     arm = planar_arm(tmp_path, count=2, mass=1.0, inertia=0.05, length=0.4)
     motors = actuators(arm.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
     task = Task(name="end", kind=TaskKind.POSITION, frame="link1", axes=(0, 1), stiffness=20.0)
-    controller = Controller(
-        arm, Hierarchy(tasks=(task,)), motors, contacts=(), posture=np.array([0.4, 0.6]),
-        options=ControllerOptions(feedback=feedback),
-    )  # fmt: skip
-    ticks = 20_000 if feedback is Feedback.STATIC_JOINT_TANK else 5_000  # it does all the others do
+    law = Law(tasks=(task,), signal=signal_named(signal))
+    controller = Controller(arm, law, motors, posture=np.array([0.4, 0.6]))
+    ticks = 20_000 if signal == "static_joint_tank" else 5_000  # it does all the others do
     assert growth(controller, arm, ticks) < 2_000
-    if feedback is Feedback.MOTOR:
+    if signal == "motor":
         assert growth(Leaking(controller), arm, 2_000) > 50_000
 
 
@@ -397,52 +400,54 @@ def test_memory_stays_flat(tmp_path, feedback):
 def test_wrong_postures_and_names_are_refused():
     for posture in (ANYMAL.posture[:-1], ANYMAL.posture[None], np.zeros(0)):
         with pytest.raises(InputError, match="posture has shape"):
-            build(replace(ANYMAL, posture=posture), ANYMAL.contacts)
+            Controller(ANYMAL.robot, ANYMAL.law, ANYMAL.actuators, posture=posture)
     with pytest.raises(UnknownNameError, match="LF_FOOT"):
         build(ANYMAL, (Contact(frame="LF_FOOTT"),))
     build(ANYMAL, ANYMAL.contacts)
 
 
-@pytest.mark.parametrize("feedback", [Feedback.STATIC_JOINT, Feedback.STATIC_JOINT_TANK])
-def test_too_soft_springs_are_refused_at_the_first_tick(feedback):
+@pytest.mark.parametrize("signal", ["static_joint", "static_joint_tank"])
+def test_too_soft_springs_are_refused_at_the_first_tick(signal):
     robot, measured, out = BAXTER.robot, at_posture(BAXTER), np.zeros(BAXTER.robot.n)
-    factor = build(BAXTER, ()).contraction * BAXTER.actuators.spring_stiffness[0]
+    factor = certified(BAXTER, ()).contraction[0] * BAXTER.actuators.spring_stiffness[0]
     for share, fails in ((1.01, False), (0.99, True)):
         motors = actuators(
             robot.joints, spring_stiffness=share * factor, rotor_inertia=0.1, motor_damping=1.0
         )
-        controller = build(BAXTER, (), motors=motors, feedback=feedback)
+        controller = build(BAXTER, (), motors=motors, signal=signal_named(signal))
         controller.reset(0.0, measured)
         if fails:
             with pytest.raises(ContractionError, match="stiffer than the springs"):
                 controller.tick(0.0, measured, out)
         else:
             controller.tick(0.0, measured, out)
-            assert controller.contraction == pytest.approx(1.0 / share, rel=1e-9)
+            assert certified(replace(BAXTER, actuators=motors), ()).contraction == pytest.approx(
+                1.0 / share, rel=1e-9
+            )
         build(BAXTER, (), motors=motors).tick(0.0, measured, out)
 
 
 def test_a_reference_out_of_reach_is_not_called_too_soft_springs():
-    rows = BAXTER.hierarchy.levels(BAXTER.robot)[-1]
+    rows = BAXTER.law.levels(BAXTER.robot)[-1]
 
     def build_far(far):
         reference = lambda _t: (far * np.eye(rows)[0], np.zeros(rows))  # noqa: E731
-        controller = build(BAXTER, (), feedback=Feedback.STATIC_JOINT, reference=reference)
+        controller = build(BAXTER, (), signal=StaticJoint(), reference=reference)
         controller.reset(0.0, at_posture(BAXTER))
         return controller
 
     out = np.zeros(BAXTER.robot.n)
     build_far(1e-3).tick(0.0, at_posture(BAXTER), out)
     far = build_far(1e6)
-    assert far.contraction < 1.0
+    assert far._law.contraction < 1.0
     with pytest.raises(ContractionError, match=r"not found.*out of reach"):
         far.tick(0.0, at_posture(BAXTER), out)
 
 
 def test_contraction_is_the_one_that_is_certified():
     for system, contacts in STANCES.values():
-        controller, stack = build(system, contacts), certified(system, contacts)
-        assert controller.contraction == pytest.approx(stack.contraction[0], rel=1e-9)
+        controller, spaces = build(system, contacts), certified(system, contacts)
+        assert controller._law.contraction == pytest.approx(spaces.contraction[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("stance", ["baxter", "anymal"])
@@ -454,7 +459,7 @@ def test_feedforward_is_the_damping_of_the_planned_motor_velocity(stance):
     wish = np.random.default_rng(4).normal(size=robot.nv)
     v = wish - np.linalg.pinv(J_s) @ J_s @ wish if len(J_s) else wish
     at = robot.workspace_at(system.posture)
-    rate = np.vstack([row.take(at) for row in system.hierarchy.rows(robot)]) @ v
+    rate = np.vstack([row.take(at) for row in system.law.rows(robot)]) @ v
     commands = {}
     for wanted in (True, False):
         controller = build(
@@ -464,7 +469,7 @@ def test_feedforward_is_the_damping_of_the_planned_motor_velocity(stance):
         commands[wanted] = np.zeros(robot.n)
         controller.tick(0.0, at_posture(system), commands[wanted])
     theta_dot = (commands[True] - commands[False]) / system.actuators.motor_damping
-    np.testing.assert_allclose(controller._space.joint_from_base @ theta_dot, v, atol=1e-8)
+    np.testing.assert_allclose(controller._law.space.joint_from_base @ theta_dot, v, atol=1e-8)
     if stance == "baxter":
         np.testing.assert_allclose(theta_dot, v, atol=1e-8)
     np.testing.assert_allclose(commands[False], 0.0, atol=1e-9)
@@ -472,19 +477,20 @@ def test_feedforward_is_the_damping_of_the_planned_motor_velocity(stance):
 
 def test_reference_moves_the_equilibrium():
     """The offset of the references is a task error, seen in the command."""
-    stack = certified(ANYMAL, ANYMAL.contacts)
+    spaces = certified(ANYMAL, ANYMAL.contacts)
     offset = 0.01 * np.arange(1.0, 7.0)
     controller = build(ANYMAL, ANYMAL.contacts, reference=lambda t: (t * offset, np.zeros(6)))
     out = np.zeros(12)
     for t in (0.0, 2.0):
         controller.tick(t, at_posture(ANYMAL), out)
-        expected = stack.J_star[0].T @ stack.stiffness[0] @ (t * offset)
+        expected = spaces.J_star[0].T @ spaces.stiffness[0] @ (t * offset)
         np.testing.assert_allclose(out, expected, atol=1e-8)
     assert np.abs(expected).max() > 0.1
 
 
-def test_form_of_the_certified_task_is_the_hierarchy_s():
-    """A tracked hierarchy is not changed by the controller that runs it."""
-    hierarchy = Hierarchy(tasks=ANYMAL.hierarchy.tasks, form=StiffnessForm.FORCE)
-    controller = build(ANYMAL, ANYMAL.contacts, hierarchy=hierarchy)
-    np.testing.assert_allclose(controller._space.stiffness, hierarchy.gain(ANYMAL.robot))
+def test_form_of_the_certified_task_is_the_law_s():
+    """A tracked law is not changed by the controller that runs it."""
+    controller = build(ANYMAL, ANYMAL.contacts, stiffness_form=StiffnessForm.FORCE)
+    np.testing.assert_allclose(controller._law.space.stiffness, ANYMAL.law.gain(ANYMAL.robot))
+    assert controller.law.stiffness_form is StiffnessForm.FORCE
+    assert ANYMAL.law.stiffness_form is StiffnessForm.SYMMETRIC

@@ -6,15 +6,13 @@ from scipy.linalg import expm
 
 from helpers.chains import planar_arm, wheel
 from sealag.actuation import actuators
-from sealag.errors import InputError
 from sealag.whole_body import (
     Controller,
-    ControllerOptions,
-    Feedback,
     GravityCompensation,
-    Hierarchy,
+    Law,
     Measurement,
     StiffnessForm,
+    Tank,
     TankFlow,
     Task,
     TaskKind,
@@ -100,20 +98,13 @@ def simulate_one_joint(folder, flow, *, up=0.0, rate=20.0, duration=1.5, spring_
     motors = actuators(robot.joints, spring_stiffness=K, rotor_inertia=B_S, motor_damping=D)
     task = Task(name="wheel", kind=TaskKind.POSTURE, stiffness=K_Q)
     d = 0.999 * BOUND
-    controller = Controller(
-        robot,
-        Hierarchy(tasks=(task,), form=StiffnessForm.FORCE),
-        motors,
-        contacts=(),
-        posture=np.zeros(1),
-        options=ControllerOptions(
-            feedback=Feedback.STATIC_JOINT_TANK,
-            gravity=GravityCompensation.NONE,
-            tank_flow=flow,
-            tank_rate=rate,
-            delay_bound=d,
-        ),
+    law = Law(
+        tasks=(task,),
+        signal=Tank(rate=rate, flow=flow),
+        gravity=GravityCompensation.NONE,
+        stiffness_form=StiffnessForm.FORCE,
     )
+    controller = Controller(robot, law, motors, posture=np.zeros(1), delay_bound=d)
     steps, whole = round(duration / STEP), int(d / STEP) - 1  # a held sample ages by one step more
     old = round(up * whole)
     A = np.array(
@@ -170,22 +161,23 @@ def test_total_never_rises_with_either_flow_where_u_is_zero(tmp_path):
         assert (energy == 1.0).all()
 
 
-def arm_controller(folder, *, reference=None, **options):
+def arm_controller(folder, *, reference=None, rate, **options):
     arm = planar_arm(folder, count=2, mass=1.0, inertia=0.05, length=0.4)
     motors = actuators(arm.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
     task = Task(name="posture", kind=TaskKind.POSTURE, stiffness=50.0)
-    hierarchy = Hierarchy(tasks=(task,), form=StiffnessForm.FORCE)
-    return Controller(
-        arm, hierarchy, motors, contacts=(), posture=np.array([0.3, -0.5]), reference=reference,
-        options=ControllerOptions(
-            feedback=Feedback.STATIC_JOINT_TANK, gravity=GravityCompensation.NONE, **options
-        ),
-    )  # fmt: skip
+    law = Law(
+        tasks=(task,),
+        signal=Tank(rate=rate),
+        gravity=GravityCompensation.NONE,
+        stiffness_form=StiffnessForm.FORCE,
+        **options,
+    )
+    return Controller(arm, law, motors, posture=np.array([0.3, -0.5]), reference=reference)
 
 
 def test_lost_and_uneven_samples_leave_no_drift_in_x_hat(tmp_path):
     """x̂ moves by J* Δθ between samples: with u = 0 the command is that of motor angles."""
-    controller = arm_controller(tmp_path, tank_rate=0.0)
+    controller = arm_controller(tmp_path, rate=0.0)
     measured, out = Measurement.allocate(nq=2, nv=2, n=2), np.zeros(2)
     measured.q[:] = measured.theta[:] = [0.3, -0.5]
     controller.reset(0.0, measured)
@@ -206,7 +198,7 @@ def test_reference_moves_the_goal_and_not_x_hat(tmp_path):
     controller = arm_controller(
         tmp_path,
         reference=lambda t: (np.full(2, 0.1 * t), np.full(2, 0.1)),
-        tank_rate=0.0,
+        rate=0.0,
         velocity_feedforward=False,
     )
     measured, out = Measurement.allocate(nq=2, nv=2, n=2), np.zeros(2)
@@ -216,18 +208,3 @@ def test_reference_moves_the_goal_and_not_x_hat(tmp_path):
     np.testing.assert_allclose(out, 0.0, atol=1e-12)
     controller.tick(1.0, measured, out)
     np.testing.assert_allclose(out, 50.0 * 0.1, atol=1e-10)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"tank_energy": -1.0},
-        {"tank_rate": np.inf},
-        {"delay_bound": np.nan},
-        {"static_iterations": 0},
-    ],
-)
-def test_options_refuse_what_cannot_be_run(wrong):
-    with pytest.raises(InputError, match=next(iter(wrong))):
-        ControllerOptions(**wrong)
-    ControllerOptions(**dict.fromkeys(wrong, 1))

@@ -239,6 +239,14 @@ def show_json(answer: dict[str, Any]) -> None:
     print(json.dumps(answer, allow_nan=False))
 
 
+def _write_no_more() -> None:
+    """Drop what standard output did not take, which would end the process with another status."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and end the process with its status.
 
@@ -252,6 +260,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         status = app(args=words, prog_name="sealag", standalone_mode=False)
+        sys.stdout.flush()
     except SealagError as error:
         line = str(error).replace("\n", "\\n")
         print(f"sealag: {line}", file=sys.stderr)
@@ -264,10 +273,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         problem = error.format_message().rstrip(".")
         print(f"sealag: {problem}; see sealag {asked}--help.", file=sys.stderr)
         raise SystemExit(WRONG_INPUT) from None
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise SystemExit(0) from None
+    except (BrokenPipeError, SystemExit):  # Typer ends with 1, a no, when the reader is gone
+        _write_no_more()
+        raise SystemExit(FAILED) from None
     except Exception as error:
+        _write_no_more()
         words = " ".join(str(error).split())[:300]
         print(
             f"sealag: the tool itself failed ({type(error).__name__}: {words}); this is no answer "

@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from sealag.cli._app import show_json
-from sealag.design import System, certify, load, load_motion, resolve_project, starter_project
+from sealag.design import (
+    System,
+    certify,
+    check_question,
+    load,
+    load_motion,
+    resolve_project,
+    starter_project,
+)
 from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import check_output, make_folder, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
@@ -81,14 +89,12 @@ def certify_project(
     path = out or Path(f"{resolve_project(project).stem}.certificate.json")
     system = load(project)
     check_output(path, *system.files, *([motion] if motion else []))
+    along, count = _motion(system, motion), None if proofs == "all" else int(proofs)
+    check_question(system, along, criterion, time_varying=time_varying, proofs=count)
     compile_kernels()
     with _busy("certifying"):
         certificate = certify(
-            system,
-            _motion(system, motion),
-            criterion=criterion,
-            time_varying=time_varying,
-            proofs=None if proofs == "all" else int(proofs),
+            system, along, criterion=criterion, time_varying=time_varying, proofs=count
         )
     write_certificate(certificate, path)
     if as_json:
@@ -155,9 +161,10 @@ def margin_project(
         )
     system = load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
+    along = _motion(system, motion)
     compile_kernels()
     with _busy("computing margins"):
-        found = local_margins(system, _motion(system, motion), horizon=horizon)
+        found = local_margins(system, along, horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)
@@ -185,7 +192,7 @@ def verify_certificate(
 ) -> int:
     """Check a certificate, against its project if one is given; 1 if it does not hold."""
     from sealag.design import verify_design
-    from sealag.passivity import verify
+    from sealag.passivity import read_certificate, verify
 
     if second:
         if exact or project is not None or motion is not None:
@@ -196,8 +203,11 @@ def verify_certificate(
             raise InputError("--motion says nothing without --project.")
         result = verify(path, exact=exact)
     else:
+        read_certificate(path)
         system = load(project)
-        result = verify_design(path, system, _motion(system, motion), exact=exact)
+        along = _motion(system, motion)
+        compile_kernels()
+        result = verify_design(path, system, along, exact=exact)
     if as_json:
         show_json(result.to_json_dict())
     else:
@@ -222,9 +232,11 @@ def _second(path: Path, *, as_json: bool) -> int:
         for name, holds, detail in claims(read(str(path))):
             found.append({"name": name, "holds": holds, "detail": detail})
             if not as_json:
-                print(f"{words[holds]:14} {name}: {detail}".rstrip(": "), flush=True)
+                line = f"{words[holds]:14} {name}: {detail}".rstrip(": ")
+                print("".join(filter(str.isprintable, line)), flush=True)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise CertificateError(f"{path} is not a certificate: {error}.") from error
+        problem = "".join(filter(str.isprintable, str(error)))[:200]
+        raise CertificateError(f"{path} is not a certificate: {problem}.") from error
     valid = all(one["holds"] is not False for one in found)
     if as_json:
         show_json({"valid": valid, "claims": found})

@@ -125,8 +125,9 @@ def summary(run: Run, path: Path) -> dict[str, Any]:
         "recording": str(path),
         "largest_joint_speed_rad_s": float(np.abs(run.theta_dot).max()),
         "largest_spring_torque_nm": float(np.abs(run.tau_sea).max()),
-        "measurement_age_s": float(run.measurement_age.max()),
-        "command_age_s": float(run.command_age.max()),
+        "measurement_age_s": run.ages.measurement,
+        "command_age_s": run.ages.command,
+        "total_age_s": run.ages.total,
         "energy_residual_j": float(np.abs(books.residual).max()),
         "energy_throughput_j": float(books.throughput[-1]),
         "joint_side_passive": joint.passive,
@@ -137,8 +138,10 @@ def summary(run: Run, path: Path) -> dict[str, Any]:
         "delay_side_passive": delay.passive if delay else None,
         "delay_side_slack_j": float(delay.slack.min()) if delay else None,
         "delay_injection_j": _largest(books.delay_injection),
-        "law_injection_j": _largest(books.law_injection),
+        "law_injection_j": _largest_magnitude(books.law_injection),
+        "injection_error_j": books.injection_error,
         "delay_storage_j": _largest(books.delay_storage),
+        "delay_storage_error_j": books.delay_storage_error,
         "tank_j": float(books.tank[-1]) if books.tank is not None else None,
         "touchdowns": sum(event.kind.value == "touchdown" for event in run.events),
     }
@@ -146,6 +149,11 @@ def summary(run: Run, path: Path) -> dict[str, Any]:
 
 def _largest(values: Array | None) -> float | None:
     return None if values is None else float(values.max())
+
+
+def _largest_magnitude(values: Array | None) -> float | None:
+    """The value that is furthest from 0, with its sign."""
+    return None if values is None else float(values[np.abs(values).argmax()])
 
 
 def gait_summary(system: System, run: Run) -> dict[str, Any]:
@@ -175,6 +183,7 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
     print(f"{'simulated':26} {answer['duration_s']:.3f} s")
     print(f"{'measurement at most':26} {answer['measurement_age_s'] * 1e3:.2f} ms old")
     print(f"{'command at most':26} {answer['command_age_s'] * 1e3:.2f} ms old")
+    print(f"{'both together at most':26} {answer['total_age_s'] * 1e3:.2f} ms old")
     for name, values in books.stores.items():
         print(f"{name + ' energy':26} {values[0]:.4f} J at first, {values[-1]:.4f} J at last")
     for name, works in books.joint_flows.items():
@@ -185,10 +194,14 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
         f"{answer['energy_throughput_j']:.4g} J moved"
     )
     if books.delay_injection is not None and books.law_injection is not None:
-        print(f"{'injected by the delay':26} {answer['delay_injection_j']:.4g} J at most")
-        print(f"{'injected by moving law':26} {answer['law_injection_j']:.4g} J at most")
+        within = f"within {answer['injection_error_j']:.1e} J"
+        print(f"{'injected by the delay':26} {answer['delay_injection_j']:.4g} J at most, {within}")
+        print(f"{'injected by moving law':26} {answer['law_injection_j']:.4g} J at most, {within}")
     if books.delay_storage is not None:
-        print(f"{'stored in the delay, V_4':26} {answer['delay_storage_j']:.4g} J at most")
+        print(
+            f"{'stored in the delay, V_4':26} {answer['delay_storage_j']:.4g} J at most, within "
+            f"{answer['delay_storage_error_j']:.1e} J"
+        )
     if books.tank is not None:
         print(f"{'energy tank':26} {books.tank[0]:.4f} J at first, {books.tank[-1]:.4f} J at last")
     _show_side("joint side", books.joint_side)

@@ -61,6 +61,11 @@ class RoundTrip:
         return self.up.delay.lower_bound + self.down.delay.lower_bound
 
     @property
+    def steepest_fall(self) -> float:
+        """Sum of both ways' steepest falls, s/s."""
+        return self.up.delay.steepest_fall + self.down.delay.steepest_fall
+
+    @property
     def mean(self) -> float:
         """Sum of both ways' mean delays, s."""
         return self.up.delay.mean + self.down.delay.mean
@@ -168,15 +173,18 @@ class Delays:
         """Upper bound of the feedforward path's delay, s."""
         down = self.central.down.late_bound(self.sample_time)
         drive = self.embedded.down.late_bound(self.embedded_period or self.sample_time)
+        if self.embedded.down.overtaken and not self.embedded_period:
+            drive += self.central.down.spread  # packets overtake that left together
         return down + drive + self.sample_time + 2.0 * self.embedded_period
 
     @property
     def torque_feedback_delay(self) -> float | None:
-        """Upper bound e of how late the drives' torque feedback is, s; None if it is immediate."""
+        """Upper bound e of how late the drives' torque feedback is, with the wait for the next
+        exchange and the hold until the one after, s; None if it is immediate."""
         if not self.delayed_torque_feedback:
             return None
         period = self.embedded_period or self.sample_time
-        return self.embedded.up.late_bound(period) + self.embedded_period
+        return self.embedded.up.late_bound(period) + 2.0 * self.embedded_period
 
     def d_1_at(self, t: float | Array) -> float | Array:
         """Return the position feedback's total delay with its mean hold of half a period.

@@ -12,6 +12,7 @@ from sealag.typing import Array, IntArray
 
 _SAME = 1e-9  # s; an arrival this close after the receiver's look is at the look
 _HALVINGS = 60
+_BLOCK = 1024
 
 
 class PacketOrder(StrEnum):
@@ -58,14 +59,13 @@ class Link:
     @property
     def constant(self) -> bool:
         """Whether every packet is equally late and none is lost."""
-        varies = self.jitter or self.loss or self.delay.lower_bound < self.delay.upper_bound
-        return not varies
+        return self.loss == 0.0 and self.spread == 0.0
 
     def late_bound(self, period: float) -> float:
         """Return an upper bound (s) on how late the newest packet is, its successors' losses too.
 
-        Delay, jitter and the longest burst of losses; under ARRIVAL an overtaken packet may be
-        older by all by which delays differ.
+        Delay, jitter and the longest burst of losses; under ARRIVAL a packet that was overtaken may
+        be older by what jitter and a falling delay let it arrive later.
 
         Args:
             period: Time between two packets, s.
@@ -76,10 +76,20 @@ class Link:
         lost = self.max_burst if self.loss > 0 else 0
         if lost and not period > 0.0:
             raise InputError("lost packets have a bound only if packets have a period (> 0 s)")
-        late = self.delay.upper_bound + self.jitter
-        if self.order == PacketOrder.ARRIVAL:
-            late += late - self.delay.lower_bound
-        return late + lost * period
+        return self.delay.upper_bound + self.jitter + self.overtaken + lost * period
+
+    @property
+    def spread(self) -> float:
+        """By how much the ways of two packets may differ, s."""
+        return self.jitter + self.delay.upper_bound - self.delay.lower_bound
+
+    @property
+    def overtaken(self) -> float:
+        """How much older than the newest packet one that is taken after it may be, s."""
+        if self.order != PacketOrder.ARRIVAL:
+            return 0.0
+        closing = 1.0 - self.delay.steepest_fall  # arrivals of packets sent a second apart, s
+        return min(self.spread, self.jitter / closing) if closing > 0.0 else self.spread
 
     def arrivals(self, times: Array, rng: np.random.Generator) -> Array:
         """Draw when packets sent at ``times`` (N,) arrive (N,), s; inf where lost.
@@ -155,10 +165,14 @@ class Link:
 
     def _drawn(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
         """Jitter (N,), s, and whether each packet is lost (N,)."""
-        late, losing = rng.spawn(2)
-        jitter = self.jitter * late.random(count) if self.jitter else np.zeros(count)
-        lost = losing.random(count) < self.loss if self.loss else np.zeros(count, bool)
-        run = 0
+        jitter, lost, run = np.zeros(count), np.zeros(count, bool), 0
+        for first in range(0, count, _BLOCK):  # so that a longer run begins like a shorter one
+            rest = slice(first, first + _BLOCK)
+            size = len(jitter[rest])
+            if self.jitter > 0:
+                jitter[rest] = self.jitter * rng.random(_BLOCK)[:size]
+            if self.loss > 0:
+                lost[rest] = rng.random(_BLOCK)[:size] < self.loss
         for i in np.flatnonzero(lost):
             run = run + 1 if i and lost[i - 1] else 1
             if run > self.max_burst:

@@ -25,6 +25,11 @@ class DelaySignal(Protocol):
         ...
 
     @property
+    def steepest_fall(self) -> float:
+        """Return the largest rate at which the delay falls, s/s."""
+        ...
+
+    @property
     def mean(self) -> float:
         """Return the mean delay, s."""
         ...
@@ -64,6 +69,11 @@ class Constant:
     def lower_bound(self) -> float:
         """The value itself, s."""
         return self.value
+
+    @property
+    def steepest_fall(self) -> float:
+        """0 s/s: it never falls."""
+        return 0.0
 
     @property
     def mean(self) -> float:
@@ -121,6 +131,11 @@ class Sinusoid:
         """The mean less the amplitude, s."""
         return self.mean - self.amplitude
 
+    @property
+    def steepest_fall(self) -> float:
+        """Amplitude times angular frequency, s/s."""
+        return self.amplitude * abs(self.angular_frequency)
+
     def at(self, t: float | Array) -> float | Array:
         """Return the delay.
 
@@ -168,6 +183,12 @@ class Table:
     def lower_bound(self) -> float:
         """The smallest entry, s."""
         return float(self.delay.min())
+
+    @property
+    def steepest_fall(self) -> float:
+        """The steepest one between two neighbours, s/s."""
+        slopes = np.diff(self.delay) / np.diff(self.time)
+        return float(np.max(-slopes, initial=0.0))
 
     @property
     def mean(self) -> float:
@@ -257,6 +278,11 @@ class Share:
     def lower_bound(self) -> float:
         """The multiple of the signal's lower bound, s."""
         return self.fraction * self.signal.lower_bound
+
+    @property
+    def steepest_fall(self) -> float:
+        """The multiple of the signal's steepest fall, s/s."""
+        return self.fraction * self.signal.steepest_fall
 
     @property
     def mean(self) -> float:

@@ -1,7 +1,7 @@
 """The user's project file, motions in and out, and the certificate of a design."""
 
 from sealag.design._assumptions import assumptions_of
-from sealag.design._certify import certify
+from sealag.design._certify import certify, check_question
 from sealag.design._criteria import (
     ASYMMETRY_TOLERANCE,
     Bounds,
@@ -11,7 +11,7 @@ from sealag.design._criteria import (
 from sealag.design._local import Local, local_of, margin_of
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
-from sealag.design._project import load, resolve_project
+from sealag.design._project import load, parse_project, resolve_project
 from sealag.design._recheck import verify_design
 from sealag.design._simulate import scenario_duration, simulate, walk_scene
 from sealag.design._starter import starter_project
@@ -29,12 +29,14 @@ __all__ = [
     "assumptions_of",
     "certified_bounds",
     "certify",
+    "check_question",
     "load",
     "load_motion",
     "local_margins",
     "local_of",
     "margin_of",
     "motion_table",
+    "parse_project",
     "published_bounds",
     "resolve_project",
     "save_motion",

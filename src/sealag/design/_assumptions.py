@@ -76,21 +76,27 @@ def _of_delays(system: System) -> Iterator[tuple[str, str]]:
     delays = system.delays
     yield (
         "delay_bound",
-        f"d_1 is at most {time_text(delays.d_1)}; it may vary below that (order, phase, frequency "
-        "and table of the delays act in simulation only).",
+        f"d_1 is at most {time_text(delays.d_1)}, with the hold of a controller period of "
+        f"{time_text(delays.sample_time)} (sample_time_ms; 1 ms where the design states none); it "
+        "may vary below that as it likes (order, "
+        "phase_rad, angular_frequency_rad_s, time_s and period_s of the delays shape a run only).",
     )
     ways = {
         "central_up": delays.central.up,
         "central_down": delays.central.down,
         "embedded_down": delays.embedded.down,
     }
-    for name, link in ways.items():
-        if share := share_left_out(link.delay):
-            yield (
-                "delay_quantile",
-                f"{share:.1%} of the packets on the way {name} are later than the bound: the "
-                "quantile of the samples leaves them out. For these nothing is certified.",
-            )
+    left_out = [
+        f"{share:.1%} of the packets on the way {name}"
+        for name, link in ways.items()
+        if (share := share_left_out(link.delay))
+    ]
+    if left_out:
+        yield (
+            "delay_quantile",
+            f"Later than the bound are {' and '.join(left_out)}: the quantile of the samples "
+            "leaves them out. For these nothing is certified.",
+        )
     yield (
         "one_delay",
         "The ways up and down count by their sum d_1; d_2 delays the feedforward and moves no "
@@ -166,14 +172,11 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
 
 def _of_contacts(system: System) -> Iterator[tuple[str, str]]:
     if system.contacts:
-        yield (
-            "contacts",
-            "Contacts neither slip nor lift off (friction, foot_radius, foot_half_length, "
-            "foot_half_width, torsional_damping and torsional_radius act in simulation only).",
-        )
+        yield "contacts", "Contacts neither slip nor lift off."
     yield (
         "simulation",
-        "What [simulation] says (scenario, duration_s, physics_step_ms, pushes with frame, "
-        "force_n, start_s and duration_s, drop_height, track_amplitude, track_frequency_hz, seed, "
-        "and the ground and feet) sets a run, not the loop.",
+        "What [simulation] says sets a run, not the loop: scenario, duration_s, physics_step_ms, "
+        "seed, pushes (frame, force_n, start_s, duration_s), drop_height, track_amplitude, "
+        "track_frequency_hz, and of the feet friction, foot_radius, foot_half_length, "
+        "foot_half_width, torsional_damping and torsional_radius.",
     )

@@ -28,6 +28,7 @@ from sealag.passivity import (
     Certificate,
     Criterion,
     Critical,
+    LocalLoop,
     Rest,
     Solver,
     Status,
@@ -80,7 +81,7 @@ def certify(
         RobotError: a mass matrix is not positive definite.
         UnknownNameError: a frame or joint does not exist.
     """
-    kind = _criterion(system, motion, criterion, time_varying=time_varying, proofs=proofs)
+    kind = check_question(system, motion, criterion, time_varying=time_varying, proofs=proofs)
     rest = system.rest() if motion is None else None
     motion = system.still() if motion is None else motion
     spaces = system.spaces(motion)
@@ -135,15 +136,26 @@ def certify(
     )
 
 
-def _criterion(
+def check_question(
     system: System,
     motion: Motion | None,
     criterion: Criterion | str | None,
     *,
-    time_varying: bool,
-    proofs: int | None,
+    time_varying: bool = False,
+    proofs: int | None = PROOF_COUNT,
 ) -> Criterion:
-    """The criterion that is asked for, if the question has an answer."""
+    """Return the criterion that `certify` would use, if what it is asked has an answer.
+
+    Args:
+        system: the design.
+        motion: the motion, or None.
+        criterion: what is asked for, or None.
+        time_varying: whether a bound for matrices that move is asked for.
+        proofs: how many instants with their numbers; None for all.
+
+    Raises:
+        InputError: as `certify` raises it.
+    """
     if not isinstance(motion, Motion | None):
         raise InputError(f"motion is {motion!r}; load_motion makes a Motion of a file.")
     if proofs is not None and not (isinstance(proofs, int) and proofs >= 1):
@@ -282,8 +294,12 @@ def _over_motion(motion: Motion, local: Local) -> dict[str, Any]:
         "unstable_modes": local.unstable_modes,
         "instant_margins_s": [None if np.isnan(one.delay) else one.delay for one in local.instants],
         "instant_basis": [one.basis for one in local.instants],
-        "local_loop": None if local.loop is None else stated_loop(local.loop, local.margin),
+        "local_loop": _stated(local),
     }
+
+
+def _stated(local: Local) -> LocalLoop | None:
+    return None if local.loop is None else stated_loop(local.loop, local.margin, local.at)
 
 
 def _shared(bounds: Bounds, common: Common | None, moving: Moving | None) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from sealag.margin import DelayMargin
 from sealag.passivity import (
     Criterion,
     LocalLoop,
+    Place,
     Proof,
     Solver,
     Window,
@@ -165,21 +166,25 @@ def refuted_delay(system: System, bounds: Bounds, instant: int, motion: Array) -
     return power / max(abs(motion.conj() @ bounds.F[instant] @ motion), 1e-300)
 
 
-def stated_loop(loop: FrozenLoop, margin: DelayMargin | None) -> LocalLoop:
+def stated_loop(loop: FrozenLoop, margin: DelayMargin | None, at: Place) -> LocalLoop:
     """Return a frozen loop as a certificate states it.
 
     Args:
         loop: the loop.
         margin: its margin; None if it could not be decided.
+        at: where it is frozen.
     """
     crosses = margin is not None and math.isfinite(margin.frequency)
+    late = bool(loop.A_e.any()) and loop.embedded_delay > 0.0
+    size = np.linalg.norm(loop.symmetries, axis=0)
     return LocalLoop(
-        A_0=loop.A_0.tolist(),
+        A_0=(loop.A_0 if late else loop.A_0 + loop.A_e).tolist(),
         A_1=loop.A_1.tolist(),
-        A_e=loop.A_e.tolist() if loop.A_e.any() else None,
-        embedded_delay_s=loop.embedded_delay,
-        symmetries=loop.symmetries.tolist(),
+        A_e=loop.A_e.tolist() if late else None,
+        embedded_delay_s=loop.embedded_delay if late else 0.0,
+        symmetries=(loop.symmetries / size).tolist() if len(size) else [],
         states=list(loop.states),
+        at=at,
         frequency_rad_s=float(margin.frequency) if margin is not None and crosses else None,
     )
 

@@ -8,7 +8,7 @@ from sealag.design._criteria import ASYMMETRY_TOLERANCE, Bounds
 from sealag.design._system import System
 from sealag.errors import ContractionError, SolverError
 from sealag.margin import DelayMargin, delay_margin
-from sealag.passivity import Basis
+from sealag.passivity import Basis, Place
 from sealag.robot import Motion
 from sealag.typing import Array
 from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, Spaces, sea_loop
@@ -49,6 +49,7 @@ class Local:
             most unstable roots.
         margin: its exact margin; None if none could be decided.
         loop: its frozen loop; None where the law has none.
+        at: where that is frozen.
         rest: where it rests; None if it was not looked for.
         problem: why the critical instant has no margin, in words; empty if it has.
     """
@@ -57,6 +58,7 @@ class Local:
     critical: int
     margin: DelayMargin | None
     loop: FrozenLoop | None
+    at: Place
     rest: Rest | None
     problem: str
 
@@ -86,7 +88,11 @@ class Local:
         return float(self.margin.first_crossing)
 
     def undercut(self, bounds: Array) -> list[int]:
-        """Return the instants whose exact margin lies below their bound (N,)."""
+        """Return the instants whose exact margin lies below their bound.
+
+        Args:
+            bounds: (N,) s.
+        """
         return [
             k
             for k, one in enumerate(self.instants)
@@ -94,7 +100,11 @@ class Local:
         ]
 
     def count(self, basis: Basis) -> int:
-        """Return how many instants were decided in a way."""
+        """Return how many instants were decided in a way.
+
+        Args:
+            basis: the way.
+        """
         return sum(one.basis is basis for one in self.instants)
 
 
@@ -103,7 +113,8 @@ def local_of(system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> 
 
     Each instant is a loop that holds the instant's configuration. It is frozen in that
     configuration and, where the law sags, where it rests with the references as they are; the
-    smaller margin counts. Where the law has a potential, rests at the instant itself, joints
+    smaller margin counts. An instant of a motion that is unstable in its configuration is not
+    looked at elsewhere. Where the law has a potential, rests at the instant itself, joints
     determine all motions and the drives are ideal, a strict minimum of the potential is stable
     without delay, and the passive bound lies below the margin (V̇ ≤ 0 for delays up to it): such an
     instant is decided exactly only if its bound lies below the smallest margin known. All others
@@ -124,6 +135,7 @@ class _Known:
 
     margin: DelayMargin | None
     loop: FrozenLoop | None
+    at: Place
     rest: Rest
     problem: str
 
@@ -162,13 +174,16 @@ class _Decision:
             delay = float(self._bounds.delay[k])
             self._found[k] = InstantMargin(basis=Basis.BOUND, delay=delay)
         for k in sorted(minima, key=lambda at: float(self._bounds.delay[at])):
-            if self._bounds.delay[k] >= self._least():
+            if self._best is not None and self._bounds.delay[k] >= self._least():
                 break
             self._search(k, minima[k])
+        if self._best is None:  # no search came to an end
+            self._decide(min(minima, key=lambda at: float(self._bounds.delay[at])))
         assert self._best is not None
         return Local(
             instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
-            loop=self._best.loop, rest=self._best.rest, problem=self._best.problem,
+            loop=self._best.loop, at=self._best.at, rest=self._best.rest,
+            problem=self._best.problem,
         )  # fmt: skip
 
     def _least(self) -> float:
@@ -194,17 +209,19 @@ class _Decision:
         if margin.delay < least or np.isinf(least):
             self._found[k] = InstantMargin(basis=Basis.EXACT, delay=float(margin.delay))
             rest = self._system.in_posture(self._motion, k)
-            self._best = _Known(margin=margin, loop=loop, rest=rest, problem="")
+            self._best = _Known(margin=margin, loop=loop, at=Place.POSTURE, rest=rest, problem="")
             self._critical = k
         else:
             self._found[k] = InstantMargin(basis=Basis.SEARCHED, delay=least)
 
     def _decide(self, k: int) -> bool:
         """Decide an instant exactly; return whether it is unstable without delay."""
-        states = [self._system.in_posture(self._motion, k)]
-        if not (self._system.law.rests_at_posture and states[0].found):
-            states.append(self._system.rest(self._motion, k))
-        worst = min((self._at(k, state) for state in states), key=_Known.order)
+        known = [self._at(k, Place.POSTURE, self._system.in_posture(self._motion, k))]
+        settled = self._system.law.rests_at_posture and known[0].rest.found
+        lost = len(self._motion) > 1 and known[0].delay == 0.0
+        if not (settled or lost):
+            known.append(self._at(k, Place.REST, self._system.rest(self._motion, k)))
+        worst = min(known, key=_Known.order)
         unstable = worst.delay == 0.0
         if worst.delay is not None:
             self._found[k] = InstantMargin(
@@ -214,7 +231,7 @@ class _Decision:
             self._best, self._critical = worst, k
         return unstable
 
-    def _at(self, k: int, state: Rest) -> "_Known":
+    def _at(self, k: int, at: Place, state: Rest) -> "_Known":
         """What is known of the loop of an instant, frozen at a state."""
         loop, margin, problem = None, None, state.reason
         try:
@@ -222,7 +239,7 @@ class _Decision:
             margin = margin_of(loop)
         except (ContractionError, SolverError) as error:
             problem = problem or str(error)
-        return _Known(margin=margin, loop=loop, rest=state, problem=problem)
+        return _Known(margin=margin, loop=loop, at=at, rest=state, problem=problem)
 
     def _minima(self) -> dict[int, FreeLinks]:
         """Links at the instants that a potential decides: stable, with a margin above the bound."""

@@ -18,6 +18,9 @@ AGREEMENT = 1e-6
 """Relative difference up to which recomputed numbers agree: another machine rounds in another way,
 and bounds are brackets of that width."""
 
+_PROBES = np.array([0.3 + 1.0j, 1.0 + 1.0j, 3.0 + 10.0j])
+"""Places right of the axis, as multiples of the crossing's frequency, where loops are compared."""
+
 _NOT_UNIQUE = frozenset(
     {"local_loop", "common_multiplier", "time_varying_multiplier", "time_varying_windows",
      "proofs", "worst_motion", "versions", "hashes", "common_multiplier_delay_s",
@@ -76,8 +79,9 @@ def _recomputed(data: dict[str, Any], system: System, motion: Motion | None) -> 
     for name, value in fresh.items():
         if name not in _NOT_UNIQUE:
             where = _difference(data[name], value)
-            words = where or "as computed anew"
+            words = where.removeprefix(":").strip() or "as computed anew"
             yield Check(name=f"design: {name}", ok=not where, detail=words)
+    yield _versions(data["versions"], fresh["versions"])
     if data["time_s"] != fresh["time_s"]:
         return
     spaces = system.spaces(motion)
@@ -93,6 +97,7 @@ def _recomputed(data: dict[str, Any], system: System, motion: Motion | None) -> 
         yield _matrices(proof, held.get(proof["instant"]), bounds.F[proof["instant"]])
     if data["common_multiplier"] is not None:
         yield _common(data, bounds.F)
+    yield _loop(data["local_loop"], fresh["local_loop"])
 
 
 def _difference(claimed: Any, found: Any, where: str = "") -> str:
@@ -128,6 +133,47 @@ def _matrices(proof: dict[str, Any], fresh: dict[str, Any] | None, F: Array) -> 
         fits = claimed.shape == found.shape
         gaps.append(float(np.abs(claimed - found).max(initial=0.0)) / size if fits else np.inf)
     return Check(name=name, ok=max(gaps) <= AGREEMENT, detail=f"to {max(gaps):.1e}")
+
+
+def _versions(claimed: dict[str, str], here: dict[str, str]) -> Check:
+    """Another sealag answers in its own way; other libraries round in another way, and may."""
+    same = set(claimed) == set(here) and claimed["sealag"] == here["sealag"]
+    others = [f"{name} {v}" for name, v in claimed.items() if v != here.get(name)]
+    words = f"others than here: {', '.join(others)}" if others else "those here"
+    return Check(name="design: versions", ok=same, detail=words)
+
+
+def _loop(claimed: dict[str, Any] | None, fresh: dict[str, Any] | None) -> Check:
+    """The frozen loop, whatever the coordinates z: what torques of motors and drives do to them."""
+    name = "design: local_loop"
+    if claimed is None or fresh is None:
+        words = "none" if fresh is None else "it has one"
+        return Check(name=name, ok=claimed is fresh, detail=words)
+    for key in ("at", "states", "frequency_rad_s", "embedded_delay_s"):
+        if where := _difference(claimed[key], fresh[key], f"local_loop.{key}"):
+            return Check(name=name, ok=False, detail=where)
+    if (claimed["A_e"] is None) != (fresh["A_e"] is None):
+        return Check(name=name, ok=False, detail="A_e is there in one of both only")
+    gaps = []
+    for s in _PROBES * (fresh["frequency_rad_s"] or 10.0):
+        found, wanted = (_answers(loop, s) for loop in (claimed, fresh))
+        gaps.append(float(np.abs(found - wanted).max() / np.abs(wanted).max()))
+    words = f"motors answer to torques as computed anew, to {max(gaps):.1e}"
+    return Check(name=name, ok=max(gaps) <= AGREEMENT, detail=words)
+
+
+def _answers(loop: dict[str, Any], s: complex) -> Array:
+    """Motors, drives and tank (m, m) under forces on their rates, at s with both delays at 1/|s|.
+
+    A_0 and A_1 answer apart, so that neither can hide in the other.
+    """
+    kept = [k for k, name in enumerate(loop["states"]) if not name.startswith(("z", "d/dt z"))]
+    A_0, A_1 = np.array(loop["A_0"]), np.array(loop["A_1"])
+    A_e = 0.0 if loop["A_e"] is None else np.array(loop["A_e"])
+    late = np.exp(-s / abs(s))
+    whole = [A_0, A_0 + late * A_1, A_0 + late * A_e]
+    answers = [np.linalg.inv(s * np.eye(len(A_0)) - A)[np.ix_(kept, kept)] for A in whole]
+    return np.stack(answers)
 
 
 def _common(data: dict[str, Any], F: Array) -> Check:

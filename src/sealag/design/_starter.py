@@ -100,7 +100,7 @@ def _height(robot: Robot, feet: list[str], positions: Array) -> float | None:
     if not feet:
         return None
     q = robot.configuration(positions)
-    return -min(float(robot.frame_placement(foot, q)[1][2]) for foot in feet)
+    return -float(robot.link_heights(feet, q).min())
 
 
 def _middle(robot: Robot, index: int) -> float:
@@ -114,8 +114,9 @@ def _feet(robot: Robot) -> list[str]:
     words = ("foot", "sole", "toe")
     names = [name for name in robot.link_names() if any(w in name.lower() for w in words)]
     lowest: dict[int, tuple[float, str]] = {}
-    for name, joint in zip(names, robot.frame_mounts(names)[0].tolist(), strict=True):
-        height = float(robot.frame_placement(name, robot.neutral())[1][2])
+    joints = robot.frame_mounts(names)[0].tolist()
+    heights = robot.link_heights(names, robot.neutral()).tolist()
+    for name, joint, height in zip(names, joints, heights, strict=True):
         lowest[joint] = min(lowest.get(joint, (np.inf, name)), (height, name))
     return [name for _, name in lowest.values()][:4]
 

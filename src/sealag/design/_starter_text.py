@@ -22,10 +22,10 @@ rotor_inertia = {rotor}
 inertia_shaping = "FILL: beta = B_s / B; 1 without torque feedback"
 motor_damping = "FILL: D_theta, Nms/rad (Ns/m where the joint slides), embedded and not delayed"
 # spring_damping = 0.0         # Nms/rad
-# coulomb_friction = 0.0       # Nm, of the motor
+# coulomb_friction = 0.0       # Nm, of the motor; the URDF's friction if left out
 # viscous_friction = 0.0       # Nms/rad, of the motor
-# torque_limit = 80.0          # Nm; none if left out
-# velocity_limit = 12.0        # rad/s; none if left out
+# torque_limit = 80.0          # Nm; the URDF's effort if left out
+# velocity_limit = 12.0        # rad/s; the URDF's velocity if left out
 # torque_bandwidth = 600.0     # rad/s, of the current loop; ideal if left out
 # Joints that differ:
 # [actuators.joint.{joint}]

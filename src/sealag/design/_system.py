@@ -58,7 +58,8 @@ class System:
         actuators: its series elastic actuators.
         law: the whole-body control law.
         posture: (nq,) configuration that the law holds, and that is certified without a motion.
-        delays: both connections' delays.
+        delays: both connections' delays, with the period of a controller that runs: the hold of
+            one that states none counts too.
         contacts: which frames are held when a motion does not say it.
         name: what messages and files call it.
         criterion: the criterion that certifies by default.
@@ -89,6 +90,7 @@ class System:
         """
         object.__setattr__(self, "posture", np.asarray(self.posture, dtype=float))
         object.__setattr__(self, "contacts", tuple(self.contacts))
+        object.__setattr__(self, "delays", self.delays.sampled())
         if self.actuators.joints != self.robot.joints:
             raise InputError(
                 f"The actuators are of {', '.join(self.actuators.joints)}, the robot's joints are "

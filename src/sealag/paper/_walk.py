@@ -57,7 +57,7 @@ class WalkCase:
         pushes: Disturbing forces.
         seed: Of noise and model errors.
         physics: Step of the plant, s.
-        embedded: Period at which the drives look for commands, s; 0 is each physics step.
+        embedded: Period at which the drives look for commands, s; 0 for at once.
         log_period: Between logged instants, s.
     """
 

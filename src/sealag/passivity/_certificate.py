@@ -63,6 +63,17 @@ class Basis(StrEnum):
     OPEN = "open"
 
 
+class Place(StrEnum):
+    """Where a loop is frozen.
+
+    posture: in the instant's configuration, tasks without error. rest: where it comes to rest with
+    the references as they are, with an error where springs sag.
+    """
+
+    POSTURE = "posture"
+    REST = "rest"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assumption:
     """Something that is taken for granted.
@@ -185,6 +196,8 @@ class LocalLoop:
         states: (s,) names: z0 … coordinates of the motions that the contacts leave free,
             theta:JOINT motor angles, `d/dt` of each, drive:JOINT the torque of a motor with a
             bandwidth, tank:ROW the states of the energy tank.
+        at: where it is frozen. In the posture A_1 holds the F of the bound; at rest J* and S are
+            those of the configuration there.
         frequency_rad_s: of the roots that cross at `first_crossing_s`; None where none does, or
             none is known.
     """
@@ -195,6 +208,7 @@ class LocalLoop:
     embedded_delay_s: float
     symmetries: list[list[float]]
     states: list[str]
+    at: Place
     frequency_rad_s: float | None
 
 

@@ -13,6 +13,9 @@ Reader = Callable[[Any], Array]
 
 EPS = float(np.finfo(float).eps)
 
+DOUBT = "in doubt: --exact decides"
+"""What is said of an eigenvalue that rounding may have moved over 0."""
+
 
 def doubles(values: Any) -> Array:
     """Read numbers of a file as doubles.
@@ -144,7 +147,7 @@ def positive_complement(
 
 
 def _words(lowest: float, room: float) -> str:
-    doubt = ", in doubt: --exact decides" if abs(lowest) <= room else ""
+    doubt = f", {DOUBT}" if abs(lowest) <= room else ""
     return f"lowest eigenvalue {lowest:.3e}, rounding {room:.1e}{doubt}"
 
 

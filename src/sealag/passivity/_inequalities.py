@@ -10,11 +10,13 @@ import numpy as np
 from sealag.passivity._certificate import Certificate, Criterion, Proof, Window
 from sealag.passivity._checks import Check
 from sealag.passivity._definite import (
+    DOUBT,
     Reader,
     as_doubles,
     like,
     positive_complement,
     positive_definite,
+    rationals,
     size,
 )
 from sealag.typing import Array
@@ -35,13 +37,13 @@ def proof_checks(c: Certificate, number: Reader) -> Iterator[Check]:
     """
     D, K = number(c.D_theta), number(c.spring_stiffness)
     for proof in c.proofs:
-        yield from _proof(c, proof, number, D=D, K=K)
+        yield from _proof(c, proof, number, K=K)
     yield from _common(c, number, D=D)
 
 
-def _proof(c: Certificate, proof: Proof, number: Reader, *, D: Array, K: Array) -> Iterator[Check]:
+def _proof(c: Certificate, proof: Proof, number: Reader, *, K: Array) -> Iterator[Check]:
     """One instant: delay, stiffness, multipliers."""
-    name, n = f"instant {proof.instant}", len(D)
+    name = f"instant {proof.instant}"
     J, S, G, F = (
         number(part) for part in (proof.J_star, proof.stiffness, proof.F_gravity, proof.F)
     )
@@ -52,18 +54,37 @@ def _proof(c: Certificate, proof: Proof, number: Reader, *, D: Array, K: Array) 
         detail=f"{proof.delay_s:.9g} s",
     )
     yield from _stiffness(name, c, J=J, S=S, G=G, F=F, K=K)
-    d, terms = number([proof.delay_s])[0], None
-    if c.criterion is Criterion.CERTIFIED:
-        loss, M = W[0], F
-    else:
+    if c.criterion is Criterion.PUBLISHED:
         apart = _apart(S, c.levels)
         words = f"no task stiffness between levels {c.levels}"
         yield Check(name=f"{name}: priority levels", ok=apart, detail=words)
-        loss, M = _levels(J, S, W, c.levels)
-        terms = _terms(proof, n)
+    d = number([proof.delay_s])[0]
     gap = max(size(d * q - w) / max(size(w), 1e-300) for q, w in zip(Q, W, strict=True))
     yield Check(name=f"{name}: W = d Q", ok=gap <= AGREEMENT, detail=f"to {gap:.1e}")
-    yield _inequality(f"{name}: matrix inequality", D, d, loss=loss, M=M, W=W, terms=terms)
+    found = _multiplied(c, proof, number)
+    if DOUBT in found.detail:
+        found = _multiplied(c, proof, rationals)
+    yield found
+
+
+def _multiplied(c: Certificate, proof: Proof, number: Reader) -> Check:
+    """The matrix inequality of one instant."""
+    J, S, F = (number(part) for part in (proof.J_star, proof.stiffness, proof.F))
+    W, terms = [number(block) for block in proof.W], None
+    if c.criterion is Criterion.CERTIFIED:
+        loss, M = W[0], F
+    else:
+        loss, M = _levels(J, S, W, c.levels)
+        terms = _terms(proof, len(c.joints))
+    return _inequality(
+        f"instant {proof.instant}: matrix inequality",
+        number(c.D_theta),
+        number([proof.delay_s])[0],
+        loss=loss,
+        M=M,
+        W=W,
+        terms=terms,
+    )
 
 
 def _apart(S: Array, edges: Sequence[int]) -> bool:
@@ -195,12 +216,20 @@ def _common(c: Certificate, number: Reader, *, D: Array) -> Iterator[Check]:
     for proof in c.proofs:
         F = number(proof.F)
         here = _inequality("", D, d, loss=blocks[0], M=F, W=blocks)
+        if DOUBT in here.detail:
+            here = _shared(c, longest, W, proof)
         bad += [] if here.ok else [f"instant {proof.instant}: {here.detail}"]
     yield Check(
         name=f"common multiplier at {len(c.proofs)} of {c.instants} instants",
         ok=not bad and bool(c.proofs),
         detail=bad[0] if bad else f"[[2D - W, dF], [dF', W]] > 0 at each for {longest:.9g} s",
     )
+
+
+def _shared(c: Certificate, longest: float, W: list[list[float]], proof: Proof) -> Check:
+    """The inequality with the shared multiplier, in rationals."""
+    D, d, F, block = (rationals(part) for part in (c.D_theta, [longest], proof.F, W))
+    return _inequality("", D, d[0], loss=block, M=F, W=[block])
 
 
 def _stated(name: str, longest: float | None, there: bool) -> Check:

@@ -337,6 +337,19 @@ class Robot:
         rotation, position = self._at(q).frame_placement(self.check_frame(frame))
         return rotation.copy(), position.copy()
 
+    def link_heights(self, links: Sequence[str], q: ArrayLike) -> Array:
+        """Return the heights (k,) of links' frames in the world, m, without compiled kernels.
+
+        Args:
+            links: their names, of `link_names`.
+            q: (nq,).
+        """
+        data = self._model.createData()
+        start = self._coupling.expand(self._checked(q, self.nq, "configuration"))
+        pin.framesForwardKinematics(self._model, data, start)
+        found = [self._model.getFrameId(name, pin.FrameType.BODY) for name in links]
+        return np.array([data.oMf[k].translation[2] for k in found])
+
     def frame_jacobian(self, frame: str, q: ArrayLike) -> Array:
         """Return a frame's Jacobian (6, nv): linear then angular velocity, axes of the world.
 

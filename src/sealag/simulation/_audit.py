@@ -70,12 +70,12 @@ class Audit:
         tank: The energy tank's part of it (N,); None without a tank.
         delay_storage: V_4 (N,) with the multiplier of the design's certificate; None if nothing
             certifies the run's design.
-        delay_storage_error: Bound of its error (N,), J; None like it.
+        delay_storage_error: Bound of its error, J; None like it.
         delay_injection: ∫(τ_osc − τ_now)ᵀθ̇ (N,): the energy that delay, sampling and losses have
             put into the robot; None if the controller does not state its undelayed command.
         law_injection: ∫τ_nowᵀθ̇ + V_3 − V_3(0) (N,): what the undelayed law has given besides its
             potential; None like ``delay_injection``.
-        injection_error: Bound of the error of both (N,), J; None like them.
+        injection_error: Bound of the error of both, J; None like them.
         joint_side: Passivity of springs, motors, links and contacts (S_j).
         controller_side: Passivity of controller and delay (S_c); None if the controller states
             no storage function.
@@ -93,10 +93,10 @@ class Audit:
     controller_storage: Array | None
     tank: Array | None
     delay_storage: Array | None
-    delay_storage_error: Array | None
+    delay_storage_error: float | None
     delay_injection: Array | None
     law_injection: Array | None
-    injection_error: Array | None
+    injection_error: float | None
     joint_side: Passivity
     controller_side: Passivity | None
     delay_side: Passivity | None
@@ -123,13 +123,13 @@ class Stated:
         storage: V_3 and the tank's energy (N,), J.
         tank: The tank's energy (N,), J; None without a tank.
         work: ∫τ_now dθ of the undelayed command per joint (N, n), J.
-        rough: Bound of the error of its sum (N,), J.
+        rough: Bound of the error of its sum, J.
     """
 
     storage: Array
     tank: Array | None
     work: Array
-    rough: Array
+    rough: float
 
 
 @dataclass(slots=True)
@@ -149,25 +149,26 @@ class UndelayedWork:
     command: Array = field(init=False)
     work: Array = field(init=False)
     rough: float = field(init=False, default=0.0)
-    _last: list[tuple[Array, Array, float]] = field(init=False, default_factory=list)
+    _last: list[tuple[Array, Array]] = field(init=False, default_factory=list)
+    _done: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
         self.command, self.work = np.zeros(self.n), np.zeros(self.n)
 
     def move(self, theta: Array) -> None:
         """Take the motor angles (n,) at which ``command`` holds."""
-        here, done = (theta.copy(), self.command.copy()), 0.0
+        here, before = (theta.copy(), self.command.copy()), self._done
         if self._last:
             gained = _trapezoid(self._last[-1], here)
             self.work += gained
-            done = float(gained.sum())
+            self._done = float(gained.sum())
         if len(self._last) == 2:
             both = float(_trapezoid(self._last[0], here).sum())
-            self.rough += 0.5 * abs(both - self._last[1][2] - done)
-        self._last = [*self._last[-1:], (*here, done)]
+            self.rough += 0.5 * abs(both - before - self._done)
+        self._last = [*self._last[-1:], here]
 
 
-def _trapezoid(start: tuple[Array, ...], end: tuple[Array, ...]) -> Array:
+def _trapezoid(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
     return 0.5 * (start[1] + end[1]) * (end[0] - start[0])
 
 
@@ -211,10 +212,9 @@ def audit(
         injection = late.sum(axis=1)
         own = stated.work.sum(axis=1) + stated.storage - stated.storage[:1]
         damped = flows["damping"].sum(axis=1)
-        rough = float(stated.rough[-1]) if time.size else 0.0
         control = _observe(time, damped - injection - own, drive, joints, tolerance)
         delay = _observe(
-            time, damped - injection, late - flows["damping"], joints, tolerance + rough
+            time, damped - injection, late - flows["damping"], joints, tolerance + stated.rough
         )
     return Audit(
         time=time,

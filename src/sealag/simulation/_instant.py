@@ -15,8 +15,9 @@ class Instant:
         v: Velocity (nv,).
         z: Joint vectors (n, 9) of the motor kernels: angle, speed and torque first.
         acceleration: v̇ (nv,).
-        power: Powers of holding, sliding, torsional and disturbing forces, W; kinetic energy
-            and gravity potential, J.
+        power: Powers of holding, sliding, torsional and disturbing forces, W, and behind them
+            ``energy``, as the kernels take both (6,).
+        energy: Kinetic energy and gravity potential (2,), J.
         tau: Spring torques (n,), Nm.
         force: Contact forces in their contact frames (P, 3), N.
         gap: Height of each contact point above the ground (P,), m; inf while it is loaded.
@@ -34,9 +35,9 @@ class Instant:
     """
 
     __slots__ = (
-        "J", "L", "acceleration", "data", "drift", "force", "gap", "position", "power", "q",
-        "right", "row", "rows", "sizes", "spin", "target", "tau", "twist_rows", "v", "velocity",
-        "z",
+        "J", "L", "acceleration", "data", "drift", "energy", "force", "gap", "position", "power",
+        "q", "right", "row", "rows", "sizes", "spin", "target", "tau", "twist_rows", "v",
+        "velocity", "z",
     )  # fmt: skip
 
     def __init__(self, sizes: tuple[int, int, int, int, int, int, int]) -> None:
@@ -51,6 +52,7 @@ class Instant:
             self.position, self.velocity, self.drift, self.J, self.target, self.rows, self.right,
             self.L, self.twist_rows, self.spin, *_,
         ) = contact.parts(self.data, sizes)  # fmt: skip
+        self.energy = self.power[4:]
         self.gap[:] = np.inf
 
     def split(self, rows: Array) -> dict[str, Array]:

@@ -28,7 +28,7 @@ from sealag.whole_body import (
 _WATCH = 5e-3  # s between two looks for a fall
 _AT_REST = 1e-12  # rad: how far the first motor angles may be from rest
 _ROUNDS = 50
-_SCALARS = ("time", "measurement_age", "command_age", "storage", "tank", "rough")
+_SCALARS = ("time", "measurement_age", "command_age", "storage", "tank")
 _LONGEST = 100.0  # rad: a spring deflection beyond any physical range
 _BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError)  # arithmetic that has no answer
 _MAY_BE_NUMERICAL = (Outcome.DIVERGED, Outcome.CONTACT_UNSOLVABLE, Outcome.CHATTERED)
@@ -384,7 +384,7 @@ class _Loop:
         storage = self._state_work(t)
         tank = 0.0 if self._tank is None else self._tank.tank_energy
         log.row(
-            (t, self._sent - self._known, t - self._acting, storage, tank, self._given.rough),
+            (t, self._sent - self._known, t - self._acting, storage, tank),
             plant.instant.row, self.command, self.acting, self._given.work,
             *plant.contacts.state, plant.ledger.data,
         )  # fmt: skip
@@ -438,7 +438,7 @@ class _Loop:
             storage=scalars["storage"],
             tank=tank if tank.any() else None,
             work=log.column("given", self.robot.n),
-            rough=scalars["rough"],
+            rough=self._given.rough,
         )
 
 

@@ -272,7 +272,7 @@ class Plant:
         )  # fmt: skip
         if not solved:
             raise self._unsolvable(self._stage, following)
-        if not math.isfinite(following.power[4]):
+        if not math.isfinite(following.energy[0]):
             raise PlantStop(
                 Outcome.DIVERGED, f"velocities are not finite after t = {self.time:.4f} s"
             )
@@ -410,5 +410,6 @@ def fastest_link(robot: Robot, actuators: Actuators, q: Array) -> tuple[float, s
     A = np.block([[O, np.diag(root)], [-mobility * root, -mobility * damping]])
     values, modes = np.linalg.eig(A)
     fastest = int(np.abs(values).argmax())
-    moved = np.abs(modes[n:, fastest])
-    return float(np.abs(values[fastest])), robot.joints[int(moved.argmax())]
+    rate, mode = float(np.abs(values[fastest])), np.abs(modes[:, fastest]) ** 2
+    taken = mode[:n] + damping * mode[n:] / rate  # energy that spring and dampers take
+    return rate, robot.joints[int(taken.argmax())]

@@ -11,7 +11,7 @@ from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._law import Law
 from sealag.whole_body._links import FreeLinks, LinkPlant, norm, null_space
 from sealag.whole_body._rest import Rest
-from sealag.whole_body._signals import LawDerivative
+from sealag.whole_body._signal_states import LawDerivative
 
 _FELT = 1e-6
 """Share of the law's stiffness from which it counts as feeling a motion of the whole robot. Central

@@ -11,7 +11,7 @@ from sealag.typing import Array
 from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._law import Law
 from sealag.whole_body._links import LinkPlant, null_space
-from sealag.whole_body._signals import SignalState
+from sealag.whole_body._signal_states import SignalState
 
 _BALANCED = 1e-10
 """Share of weight and torques that may be left over. Ten times smaller is rounding of the law; at

@@ -1,22 +1,23 @@
 """Whole-body matrices on real robots: identities, gradients, degenerate contacts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sealag.actuation import actuators
-from sealag.design import load
-from sealag.errors import ContractionError, InputError, UnknownNameError
+from sealag.design import certified_bounds, load
+from sealag.errors import ContractionError
 from sealag.robot import Contact, ContactKind, Motion
 from sealag.whole_body import (
-    Feedback,
     GravityCompensation,
-    Hierarchy,
+    MotorAngles,
+    StaticJoint,
     StiffnessForm,
     Task,
     TaskKind,
-    evaluate,
-    linearise,
     relative_asymmetry,
+    spaces_along,
     static_joint_state,
 )
 
@@ -37,13 +38,15 @@ def motion_of(system, q, contacts):
     )
 
 
-def stack_of(system, q=None, contacts=None, **options):
+def spaces_of(system, q=None, contacts=None, **changes):
     contacts = system.contacts if contacts is None else contacts
     q = system.posture if q is None else q
-    options = {"feedback": Feedback.MOTOR, "gravity": GravityCompensation.NONE, **options}
-    hierarchy = options.pop("hierarchy", system.hierarchy)
-    return evaluate(
-        system.robot, hierarchy, system.actuators, motion=motion_of(system, q, contacts), **options
+    changes = {"signal": MotorAngles(), "gravity": GravityCompensation.NONE, **changes}
+    return spaces_along(
+        system.robot,
+        replace(system.law, **changes),
+        system.actuators,
+        motion_of(system, q, contacts),
     )
 
 
@@ -57,7 +60,7 @@ def near(system, seed, spread=0.2):
 def test_jacobian_is_the_motion_that_contacts_allow(system):
     """J* q̇_j = J_t v for every v that the contacts allow and that has these joint rates."""
     robot, q = system.robot, near(system, 1)
-    stack = stack_of(system, q)
+    spaces = spaces_of(system, q)
     J_s = robot.contact_jacobian(system.contacts, q)
     M = robot.mass_matrix(q)
     Mi = np.linalg.inv(M)
@@ -66,53 +69,53 @@ def test_jacobian_is_the_motion_that_contacts_allow(system):
         N_s = N_s - Mi @ J_s.T @ np.linalg.pinv(J_s @ Mi @ J_s.T) @ J_s
     UN = N_s[robot.nv_base :]
     bar = Mi @ UN.T @ np.linalg.pinv(UN @ Mi @ UN.T, rcond=1e-9)
-    rows = [task.rows(robot) for task in system.hierarchy.ordered]
+    rows = [task.rows(robot) for task in system.law.ordered]
     at = robot.workspace_at(q)
-    first = np.vstack([row.take(at) for row in rows])[: stack.levels[1]]
-    np.testing.assert_allclose(stack.J_star[0, : stack.levels[1]], first @ bar, atol=1e-8)
+    first = np.vstack([row.take(at) for row in rows])[: spaces.levels[1]]
+    np.testing.assert_allclose(spaces.J_star[0, : spaces.levels[1]], first @ bar, atol=1e-8)
     np.testing.assert_allclose(N_s @ Mi @ J_s.T, 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("system", [HUME, ANYMAL, BAXTER, TALOS], ids=lambda s: s.name)
 def test_symmetric_form_is_symmetric_and_semidefinite_published_is_not(system):
-    stack = stack_of(system, near(system, 2))
-    F = stack.F_task[0]
-    assert stack.asymmetry[0] < 1e-12
+    spaces = spaces_of(system, near(system, 2))
+    F = spaces.F_task[0]
+    assert spaces.asymmetry[0] < 1e-12
     assert np.linalg.eigvalsh(F)[0] > -1e-9 * np.abs(F).max()
     gains = [Task(name=t.name, kind=t.kind, frame=t.frame, joints=t.joints, priority=t.priority,
                   stiffness=np.geomspace(1.0, 50.0, len(t.rows(system.robot).rows)))
-             for t in system.hierarchy.tasks]  # fmt: skip
-    printed = Hierarchy(tasks=tuple(gains), form=StiffnessForm.PUBLISHED)
-    assert stack_of(system, near(system, 2), hierarchy=printed).asymmetry[0] > 1e-4
+             for t in system.law.tasks]  # fmt: skip
+    printed = {"tasks": tuple(gains), "stiffness_form": StiffnessForm.PUBLISHED}
+    assert spaces_of(system, near(system, 2), **printed).asymmetry[0] > 1e-4
 
 
 @pytest.mark.parametrize("system", [BAXTER, ANYMAL], ids=lambda s: s.name)
 def test_gravity_gradient_is_symmetric_where_joints_move_everything(system):
     contacts = system.contacts[:2] if system is ANYMAL else ()
-    stack = stack_of(system, near(system, 3), contacts, gravity=GravityCompensation.FEEDBACK)
+    spaces = spaces_of(system, near(system, 3), contacts, gravity=GravityCompensation.FEEDBACK)
     if system is BAXTER:
         expected = system.robot.gravity_gradient(near(system, 3))
-        np.testing.assert_allclose(stack.F_gravity[0], expected, atol=1e-7)
-        assert relative_asymmetry(stack.F_gravity)[0] < 1e-9
+        np.testing.assert_allclose(spaces.F_gravity[0], expected, atol=1e-7)
+        assert relative_asymmetry(spaces.F_gravity)[0] < 1e-9
     else:
-        assert relative_asymmetry(stack.F_gravity)[0] > 1e-6, "two feet leave a free motion"
+        assert relative_asymmetry(spaces.F_gravity)[0] > 1e-6, "two feet leave a free motion"
 
 
 def test_gravity_gradient_on_four_feet_is_symmetric_on_the_motions_left():
     """Twelve joints, six motions: torques that only press the feet apart have no potential."""
     q = near(ANYMAL, 3)
-    stack = stack_of(ANYMAL, q, gravity=GravityCompensation.FEEDBACK)
+    spaces = spaces_of(ANYMAL, q, gravity=GravityCompensation.FEEDBACK)
     J_s = ANYMAL.robot.contact_jacobian(ANYMAL.contacts, q)
     free = np.linalg.svd(J_s)[2][12:].T[6:]
     basis = np.linalg.qr(free)[0]
     assert basis.shape == (12, 6)
-    assert relative_asymmetry(basis.T @ stack.F_gravity[0] @ basis) < 1e-7
-    assert relative_asymmetry(stack.F_gravity[0]) > 1e-3
+    assert relative_asymmetry(basis.T @ spaces.F_gravity[0] @ basis) < 1e-7
+    assert relative_asymmetry(spaces.F_gravity[0]) > 1e-3
 
 
 def test_static_feedback_is_stiffer_by_the_springs():
-    motor = stack_of(BAXTER)
-    static = stack_of(BAXTER, feedback=Feedback.STATIC_JOINT)
+    motor = spaces_of(BAXTER)
+    static = spaces_of(BAXTER, signal=StaticJoint())
     K = BAXTER.actuators.spring_stiffness
     F, n = motor.F_theta[0], BAXTER.robot.n
     np.testing.assert_allclose(
@@ -121,16 +124,22 @@ def test_static_feedback_is_stiffer_by_the_springs():
     assert np.linalg.eigvalsh(static.F_theta[0] - F)[0] > -1e-9 * np.abs(F).max()
 
 
-def test_static_feedback_without_contraction_is_not_a_number():
+def test_static_feedback_without_contraction_has_no_bound():
+    """And where the law is exactly as stiff as its springs, no stiffness either."""
     soft = actuators(
         BAXTER.robot.joints, spring_stiffness=5.0, rotor_inertia=0.1, motor_damping=1.0
     )
-    stack = evaluate(
-        BAXTER.robot, BAXTER.hierarchy, soft, motion=BAXTER.still(),
-        feedback=Feedback.STATIC_JOINT, gravity=GravityCompensation.NONE,
-    )  # fmt: skip
-    assert stack.contraction[0] > 1.0
-    assert np.isnan(stack.F_theta).all()
+    law = replace(BAXTER.law, signal=StaticJoint(), gravity=GravityCompensation.NONE)
+    for springs, refused in ((soft, True), (BAXTER.actuators, False)):
+        system = replace(BAXTER, actuators=springs, law=law)
+        spaces = system.spaces()
+        assert (spaces.contraction[0] > 1.0) == refused
+        assert (certified_bounds(spaces, system).delay[0] == 0.0) == refused
+        assert (law.signal.refusal(spaces.contraction) is not None) == refused
+    F = spaces_of(BAXTER).F_q
+    least = np.linalg.eigvalsh(F[0])[-1]
+    assert np.isnan(StaticJoint().motor_stiffness(F, np.full(BAXTER.robot.n, least))).all()
+    assert np.isfinite(StaticJoint().motor_stiffness(F, np.full(BAXTER.robot.n, 1.1 * least))).all()
 
 
 @pytest.mark.parametrize(
@@ -146,64 +155,33 @@ def test_static_feedback_without_contraction_is_not_a_number():
 def test_degenerate_contacts_stay_finite(contacts):
     straight = HUME.robot.configuration(np.zeros(6), base_position=(0, 0, 0.93))
     for q in (HUME.posture, straight):
-        stack = stack_of(HUME, q, contacts)
-        assert np.isfinite(stack.F_theta).all()
-        assert stack.asymmetry[0] < 1e-9
+        spaces = spaces_of(HUME, q, contacts)
+        assert np.isfinite(spaces.F_theta).all()
+        assert spaces.asymmetry[0] < 1e-9
     if len(contacts) == 2 and contacts[0] == contacts[1]:
-        once = stack_of(HUME, HUME.posture, contacts[:1])
+        once = spaces_of(HUME, HUME.posture, contacts[:1])
         np.testing.assert_allclose(
-            stack_of(HUME, HUME.posture, contacts).F_task, once.F_task, atol=1e-7
+            spaces_of(HUME, HUME.posture, contacts).F_task, once.F_task, atol=1e-7
         )
 
 
 def test_flight_leaves_no_torque_for_the_centre_of_mass():
-    com = Hierarchy(tasks=(Task(name="c", kind=TaskKind.COM, stiffness=np.array(100.0)),))
-    assert np.abs(stack_of(HUME, contacts=(), hierarchy=com).F_task).max() < 1e-6
-    assert np.abs(stack_of(HUME, hierarchy=com).F_task).max() > 10.0
+    com = (Task(name="c", kind=TaskKind.COM, stiffness=np.array(100.0)),)
+    assert np.abs(spaces_of(HUME, contacts=(), tasks=com).F_task).max() < 1e-6
+    assert np.abs(spaces_of(HUME, tasks=com).F_task).max() > 10.0
 
 
 def test_lower_levels_do_not_disturb_higher_ones():
     """Accelerations of level 1 under the torque of level 2 alone are zero."""
     robot, q = BAXTER.robot, near(BAXTER, 4)
-    stack = stack_of(BAXTER, q)
-    top = slice(0, stack.levels[1])
-    low = slice(stack.levels[1], stack.levels[2])
-    torque = stack.J_star[0, low].T @ stack.Lambda[0, low, low] @ np.ones(stack.levels[2] - 12)
+    spaces = spaces_of(BAXTER, q)
+    top = slice(0, spaces.levels[1])
+    low = slice(spaces.levels[1], spaces.levels[2])
+    torque = spaces.J_star[0, low].T @ spaces.Lambda[0, low, low] @ np.ones(spaces.levels[2] - 12)
     at = robot.workspace_at(q)
-    J = np.vstack([row.take(at) for row in BAXTER.hierarchy.rows(robot)])[top]
+    J = np.vstack([row.take(at) for row in BAXTER.law.rows(robot)])[top]
     acceleration = J @ np.linalg.solve(robot.mass_matrix(q), torque)
     assert np.abs(acceleration).max() < 1e-6 * np.abs(torque).max()
-
-
-def test_frozen_loop_of_a_fixed_robot_matches_its_matrices():
-    frozen = linearise(
-        BAXTER.robot, BAXTER.actuators, BAXTER.posture, contacts=(),
-        F=np.zeros((14, 14)), feedback=Feedback.MOTOR,
-    )  # fmt: skip
-    n = 14
-    M = BAXTER.robot.mass_matrix(BAXTER.posture)
-    stiffness = BAXTER.robot.gravity_gradient(BAXTER.posture) + np.diag(
-        BAXTER.actuators.spring_stiffness
-    )
-    np.testing.assert_allclose(
-        frozen.A_0[2 * n : 3 * n, :n], -np.linalg.solve(M, stiffness), rtol=1e-5, atol=1e-4
-    )
-    assert frozen.symmetries.shape[1] == 0
-
-
-@pytest.mark.parametrize(
-    ("contacts", "count"),
-    [((), 4), ((Contact(frame="left_foot"),), 1),
-     ((Contact(frame="left_foot"), Contact(frame="right_foot")), 0)],
-)  # fmt: skip
-def test_symmetries_are_what_contacts_leave(contacts, count):
-    F = stack_of(HUME, contacts=contacts).F_theta[0]
-    frozen = linearise(
-        HUME.robot, HUME.actuators, HUME.posture, contacts=contacts, F=F, feedback=Feedback.MOTOR
-    )
-    assert frozen.symmetries.shape[1] == count
-    moved = (frozen.A_0 + frozen.A_1) @ frozen.symmetries
-    assert np.abs(moved).max(initial=0.0) < 1e-9 * np.abs(frozen.A_0).max()
 
 
 def test_static_joint_state_solves_its_equation():
@@ -214,16 +192,3 @@ def test_static_joint_state_solves_its_equation():
     assert 0.0 < state.contraction < 1.0
     with pytest.raises(ContractionError, match="stiffer"):
         static_joint_state(theta, lambda q: -5.0 * A @ q, K)
-
-
-def test_bad_tasks_are_refused():
-    with pytest.raises(InputError, match="needs a frame"):
-        Task(name="t", kind=TaskKind.POSE, stiffness=np.array(1.0))
-    with pytest.raises(InputError, match="at least one"):
-        Hierarchy(tasks=())
-    task = Task(name="t", kind=TaskKind.POSE, frame="nose", stiffness=np.array(1.0))
-    with pytest.raises(UnknownNameError, match="nose"):
-        Hierarchy(tasks=(task,)).rows(HUME.robot)
-    wrong = Task(name="t", kind=TaskKind.COM, stiffness=np.array([1.0, 2.0]))
-    with pytest.raises(InputError, match="shape"):
-        wrong.gain(3)

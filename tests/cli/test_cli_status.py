@@ -1,0 +1,100 @@
+"""Exit statuses: 0 yes, 1 a decided no, 2 wrong input, 3 the tool failed, 130 interrupted."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sealag.cli import main
+from sealag.errors import (
+    CertificateError,
+    ContractionError,
+    FileError,
+    InputError,
+    SolverError,
+    UnknownNameError,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+HELD = str(ROOT / "examples/hume_held.toml")
+ALONE = (sys.executable, "-c", "from sealag.cli import main; main()")
+
+COMMANDS = {
+    "init": (["init", "robot.urdf"], "sealag.cli._commands.init_project"),
+    "certify": (["certify", HELD], "sealag.cli._commands.certify_project"),
+    "margin": (["margin", HELD], "sealag.cli._commands.margin_project"),
+    "verify": (["verify", "c.json"], "sealag.cli._commands.verify_certificate"),
+    "simulate": (["simulate", HELD], "sealag.cli._simulate.simulate_project"),
+    "paper": (["paper"], "sealag.cli._commands.write_paper"),
+}
+ENDS = {
+    InputError("the posture is wrong"): 2,
+    FileError("no such file"): 2,
+    CertificateError("no certificate"): 2,
+    ContractionError("springs too soft"): 2,
+    UnknownNameError("no such joint"): 2,
+    SolverError("no convergence"): 3,
+    ZeroDivisionError("division\nby zero"): 3,
+    KeyError("J_star"): 3,
+    MemoryError(): 3,
+    RecursionError("too deep"): 3,
+    KeyboardInterrupt(): 130,
+}
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([str(argument) for argument in arguments])
+    return (int(stop.value.code or 0), *capsys.readouterr())
+
+
+@pytest.mark.parametrize("error", ENDS, ids=lambda error: type(error).__name__)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_ends_with_the_status_of_its_problem(command, error, monkeypatch, capsys):
+    arguments, function = COMMANDS[command]
+
+    def fails(*_arguments, **_options):
+        raise error
+
+    monkeypatch.setattr(function, fails)
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (ENDS[error], "")
+    assert err.startswith("sealag: ")
+    assert err.strip().count("\n") == 0
+    if ENDS[error] == 3 and not isinstance(error, SolverError):
+        assert "the tool itself failed" in err
+        assert type(error).__name__ in err
+
+
+def test_yes_and_no_are_the_controls(tmp_path, capsys):
+    out = tmp_path / "c.json"
+    assert run(capsys, "certify", HELD, "--out", out)[0] == 0
+    assert run(capsys, "verify", out)[0] == 0
+    assert run(capsys, "margin", HELD)[0] == 0
+    data = json.loads(out.read_text())
+    out.write_text(json.dumps({**data, "delay_s": 10.0}))
+    assert run(capsys, "verify", out)[0] == 1
+    assert run(capsys, "certify", "bundled:hume", "--out", out)[0] == 1
+    assert run(capsys, "certify", tmp_path / "none.toml", "--out", out)[0] == 2
+
+
+def test_an_answer_that_nobody_can_read_is_no_yes(tmp_path):
+    """A reader that went away, a full disk: neither 0 nor 1, and nothing but the status."""
+    command = [*ALONE, "certify", HELD, "--out", str(tmp_path / "c.json")]
+    good = subprocess.run(command, capture_output=True, timeout=300, check=False)
+    assert good.returncode == 0
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, timeout=300, check=False
+        )
+    assert done.returncode == 3
+    assert b"No space left" in done.stderr
+    assert b"Traceback" not in done.stderr
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=300, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (3, b"")
