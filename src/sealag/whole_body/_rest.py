@@ -24,6 +24,7 @@ _PLACED = 1e-12  # m, rad: how far a contact may be from where the posture has i
 _ROUNDS = 60
 _LONGEST_STEP = 0.2  # rad: a longer Newton step leaves the region where its direction is good
 _HALVINGS = 12
+_PATIENCE = 12  # whole steps that need not bring the least residual yet
 _CUTOFF = 1e-10  # of the largest singular value: directions along which nothing acts (symmetries)
 
 
@@ -137,12 +138,15 @@ class _Search:
         ones: a soft law sags past where the residual is larger."""
         q, theta = self._posture, self._first(self._posture)
         residual = self._residual(q, theta)
+        least, since = self._size(residual), 0
         for _ in range(_ROUNDS):
             if self._small(residual):
                 return q, theta
             step = self._newton(q, theta, residual)
-            q, theta, residual, better = self._search(q, theta, step, residual, falling=falling)
-            if not better:
+            q, theta, residual, moved = self._search(q, theta, step, residual, falling=falling)
+            since = 0 if self._size(residual) < least else since + 1
+            least = min(least, self._size(residual))
+            if not moved or since > _PATIENCE:
                 return None
         return None
 
@@ -248,8 +252,7 @@ class _Search:
                 new = self._residual(new_q, new_theta)
             except ContractionError:
                 new = None
-            there = new is not None
-            if there and (not falling or self._size(new) < before or self._small(new)):
+            if new is not None and (not falling or self._size(new) < before or self._small(new)):
                 return new_q, new_theta, new, True
             share /= 2.0
         return q, theta, residual, False

@@ -115,7 +115,7 @@ def read_design(path: str | Path) -> Design:
     """
     path = Path(path)
     data = tomllib.loads(path.read_text())
-    robot, posture = data["robot"], data.get("posture", {})
+    robot, posture, law = data["robot"], data.get("posture", {}), data["controller"]
     actuators, delays = data["actuators"], data["delays"]
     rows = {"point": 3, "surface": 6}
     late = delays.get("delayed_torque_feedback", False)
@@ -132,11 +132,9 @@ def read_design(path: str | Path) -> Design:
         contacts=tuple(
             (c["frame"], rows[c.get("kind", "point")]) for c in data.get("contacts", [])
         ),
-        feedback=data["controller"]["feedback"],
-        gravity=data["controller"].get("gravity", "feedback"),
-        tank_pays=all(
-            data["controller"].get(key, 1.0) > 0.0 for key in ("tank_energy_j", "tank_rate")
-        ),
+        feedback=law["feedback"],
+        gravity=law["gravity"],
+        tank_pays=all(law.get(key, 1.0) > 0.0 for key in ("tank_energy_j", "tank_rate")),
         torque_feedback_delay=_embedded_up(delays) if late else 0.0,
     )
 

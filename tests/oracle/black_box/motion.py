@@ -54,10 +54,8 @@ def compare_motion(path: Path, csv: Path) -> Verdict:
     start = time.process_time()
 
     def verdict(kind: str, said: str) -> Verdict:
-        end = time.process_time()
-        return Verdict(
-            path=csv, kind=kind, said=said, seconds=(end - middle, middle - start), ours=None
-        )
+        seconds = time.process_time() - middle, middle - start
+        return Verdict(path=csv, kind=kind, said=said, seconds=seconds, ours=None)
 
     middle = start
     try:
