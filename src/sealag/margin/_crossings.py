@@ -16,6 +16,7 @@ _TOUCHING = 1e-6
 _STEPS = 40
 _CORRECTIONS = 2
 _CONVERGED = 1e-9
+_BESIDE = 0.005
 _FINEST = float(np.finfo(np.longdouble).eps)
 _SAME = 1e-11
 _ON_AXIS = 1e-7
@@ -134,10 +135,14 @@ def _in_passage(picture: Picture, part: Passage, curve: Curve) -> Found:
 
 
 def _belongs(picture: Picture, part: Passage, curve: Curve, point: _Point) -> bool:
-    """Whether a refined point is on the curve and in its part, ends included."""
+    """Whether a refined point is on the curve and in its part or next to an end.
+
+    Rounding may put a crossing at an end on either side. The curve's bounds leave room for it: a
+    hundredth further it still meets the axis at most once, so that both parts find one point.
+    """
     family, k = part.family, curve.index
     t = picture.parameter(point.phi, point.omega)
-    slack = 1e-13 * max(abs(part.lower), abs(part.upper))
+    slack = _BESIDE * (part.upper - part.lower)
     if not part.lower - slack <= t <= part.upper + slack:
         return False
     placed = picture.value(point.phi, point.omega)
