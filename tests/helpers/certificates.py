@@ -13,7 +13,7 @@ from sealag.errors import CertificateError
 from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.passivity import content_digest, read_certificate, verify, write_certificate
 from sealag.robot import Motion
-from sealag.whole_body import Tank
+from sealag.whole_body import MotorAngles, Tank
 
 
 def plain(certificate: Any) -> dict[str, Any]:
@@ -46,12 +46,17 @@ def _made(name: str) -> dict[str, Any]:
         return plain(
             sealag.certify(sealag.load("examples/anymal_crawl.toml"), criterion="published")
         )
+    if name == "flying":
+        system = sealag.load("examples/anymal.toml")
+        law = replace(system.law, signal=MotorAngles())
+        return plain(sealag.certify(replace(system, law=law, contacts=())))
     return plain(sealag.certify(sealag.load("examples/baxter.toml")))
 
 
 def made(name: str) -> dict[str, Any]:
     """A fresh copy: baxter (one instant), moving (half a step of Hume, with multipliers for all of
-    it), crawl (two priority levels, published), one foot (Hume, free to turn about it)."""
+    it), crawl (two priority levels, published), one foot (Hume, free to turn about it), flying
+    (ANYmal without contacts, free to move anywhere)."""
     return copy.deepcopy(_made(name))
 
 

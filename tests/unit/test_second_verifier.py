@@ -29,7 +29,7 @@ def test_it_is_short_and_stands_alone():
         assert all(name.split(".")[0] in sys.stdlib_module_names for name in names)
 
 
-@pytest.mark.parametrize("design", ["baxter", "moving", "crawl", "one foot"])
+@pytest.mark.parametrize("design", ["baxter", "moving", "crawl", "one foot", "flying"])
 def test_it_agrees_with_the_first(design):
     found = verdicts(made(design))
     assert False not in found.values(), [name for name, holds in found.items() if holds is False]

@@ -151,13 +151,13 @@ def _motors(c: Certificate, loop: LocalLoop, *, free: int) -> Check:
 def _command(c: Certificate, loop: LocalLoop, *, takes: Array, gain: Array, angle: Array) -> float:
     """How far A_1 is from rows that take the command, τ_osc = −F θ + … of free motions.
 
-    F is that of the bound where both are of one instant, in its own posture, and the motors'
-    angles determine the command.
+    F is that of the instant's own proof, where the loop is frozen in its posture and motor angles
+    determine the command.
     """
     A_1 = np.array(loop.A_1)
     C = A_1[takes] / gain[:, None]
     gap = float(np.abs(np.delete(A_1, takes, axis=0)).max(initial=0.0)) / _size(A_1)
-    proof = [p for p in c.proofs if p.instant == c.worst.instant == c.critical.instant]
+    proof = [p for p in c.proofs if p.instant == c.critical.instant]
     by_motors = c.feedback in ("motor", "static_joint") and c.criterion is Criterion.CERTIFIED
     if proof and by_motors and loop.at is Place.POSTURE:
         F = np.array(proof[0].F)
