@@ -118,7 +118,7 @@ def test_instants_of_a_motion():
         BlackBox(path, system, q=motion.q[k], contacts=motion.contact_sets[c]).both()
         for k, c in enumerate(motion.contact_index)
     ]
-    assert found[0].margin == pytest.approx(41.3457, rel=1e-5)
+    assert found[0].margin == np.inf
     assert found[1].margin == pytest.approx(0.597454, abs=1e-6)
     assert found[1].rest.margin == pytest.approx(0.61498, abs=1e-5)
     said = sealag.certify(system, motion, proofs=1)

@@ -125,7 +125,8 @@ class _Search:
     def run(self) -> Rest:
         """Return the equilibrium, or the posture with why there is none."""
         try:
-            for falling in (True, False):
+            # Where contacts do not balance the posture, its margin is 0 wherever the loop rests.
+            for falling in (True, False) if self.posture().found else (True,):
                 found = self._follow(falling=falling)
                 if found is not None:
                     return self._answer(*found, "")

@@ -56,7 +56,7 @@ class Scheme:
     arms: float = 0.0
     legged: float = 0.0
     large: float = 0.0
-    most_joints: int = 3
+    most_joints: int = 2
 
 
 SUITE = Scheme()
