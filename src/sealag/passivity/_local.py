@@ -25,10 +25,10 @@ _SHARES = (0.25, 0.5, 0.75, 0.999)
 
 _STRUCTURE = 1e-8
 
-_DIFFERENCES = 1e-7
+_DIFFERENCES = 1e-6
 """Share of F that A_1 may differ by: it holds central differences of the law that runs, good to
-1e-8. Ten times less accuses plants with stiff gains, ten times more would hide a wrong F no better
-than the first crossing, which moves in proportion."""
+1e-9 on a fixed base and to 1e-7 where contacts are followed. Ten times less accuses honest designs;
+ten times more would still be seen at the first crossing, which moves in proportion."""
 
 
 def local_checks(c: Certificate) -> Iterator[Check]:

@@ -17,6 +17,10 @@ _BALANCED = 1e-10
 """Share of weight and torques that may be left over. Ten times smaller is rounding of the law; at
 ten times larger the margin's last digits move."""
 
+_ROUNDING = 1e-15
+"""rad: of an angle, which a spring turns into torque. Stiffer springs than 1e5 times the weight
+balance no better; a hundred times larger would let ordinary ones rest too soon."""
+
 _AT_POSTURE = 1e-7
 """The same of gravity that contacts must balance in the posture, whose angles are rounded."""
 
@@ -203,7 +207,8 @@ class _Search:
 
     def _small(self, residual: tuple[Array, Array, Array]) -> bool:
         away, force, torque = (float(np.abs(part).max(initial=0.0)) for part in residual)
-        return away < _PLACED and max(force, torque) < _BALANCED * self._scale
+        room = _BALANCED * self._scale + _ROUNDING * float(self._K.max())
+        return away < _PLACED and max(force, torque) < room
 
     def _size(self, residual: tuple[Array, Array, Array]) -> float:
         away, force, torque = (float(np.linalg.norm(part)) for part in residual)
