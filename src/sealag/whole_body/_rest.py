@@ -128,6 +128,8 @@ class _Search:
 
     def run(self) -> Rest:
         """Return the equilibrium, or the posture with why there is none."""
+        if self._robot.floating_base and not self._places:  # nothing holds the robot: it falls
+            return self._answer(self._posture, self._held(), self._why())
         try:
             # Where contacts do not balance the posture, its margin is 0 wherever the loop rests.
             for falling in (True, False) if self.posture().found else (True,):
