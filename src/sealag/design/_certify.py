@@ -106,7 +106,7 @@ def certify(
     if missing:
         bounds, common, moving = without(bounds, missing), None, None
     decided = passive if kind is Criterion.CERTIFIED else without_bounds(passive)
-    local = local_of(system, motion, spaces, decided)
+    local = local_of(system, motion, spaces, decided, rest)
     return Certificate(
         **_answer(
             system,
