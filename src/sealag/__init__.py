@@ -27,6 +27,10 @@ _HOME = {
     "Motion": "sealag.robot",
     "load_robot": "sealag.robot",
     "actuators": "sealag.actuation",
+    "actuators_of": "sealag.actuation",
+    "write_certificate": "sealag.passivity",
+    "Link": "sealag.delay",
+    "RoundTrip": "sealag.delay",
     "Constant": "sealag.delay",
     "Delays": "sealag.delay",
     "Sinusoid": "sealag.delay",
@@ -39,10 +43,12 @@ __all__ = [
     "Controller",
     "Delays",
     "Law",
+    "Link",
     "LinkAngles",
     "Measurement",
     "Motion",
     "MotorAngles",
+    "RoundTrip",
     "SealagError",
     "Sinusoid",
     "StaticJoint",
@@ -51,19 +57,22 @@ __all__ = [
     "Task",
     "__version__",
     "actuators",
+    "actuators_of",
     "certify",
     "load",
     "load_motion",
     "load_robot",
     "simulate",
     "verify_design",
+    "write_certificate",
 ]
 
 if TYPE_CHECKING:
-    from sealag.actuation import actuators
-    from sealag.delay import Constant, Delays, Sinusoid
+    from sealag.actuation import actuators, actuators_of
+    from sealag.delay import Constant, Delays, Link, RoundTrip, Sinusoid
     from sealag.design import System, certify, load, load_motion, simulate, verify_design
     from sealag.errors import SealagError
+    from sealag.passivity import write_certificate
     from sealag.robot import Contact, Motion, load_robot
     from sealag.whole_body import (
         Controller,

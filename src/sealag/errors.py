@@ -6,6 +6,8 @@ sentence. "Not certified" is a result and never an exception.
 
 import difflib
 from collections.abc import Iterable, Sequence
+from enum import StrEnum
+from typing import TypeVar
 
 
 class SealagError(Exception):
@@ -63,6 +65,26 @@ def near(name: str, known: Iterable[str], *, what: str) -> UnknownNameError:
     matches = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
     hint = f"did you mean {either(matches)}?" if matches else f"there is {either(known[:12])}."
     return UnknownNameError(f"No {what} is called {name!r}; {hint}")
+
+
+W = TypeVar("W", bound=StrEnum)
+
+
+def word(kind: type[W], value: object, *, what: str) -> W:
+    """Return the member of an enumeration that a word names.
+
+    Args:
+        kind: the enumeration.
+        value: the word.
+        what: how the message calls it.
+
+    Raises:
+        InputError: there is none; the message lists those there are.
+    """
+    known = [str(member) for member in kind]
+    if not isinstance(value, str) or value not in known:
+        raise InputError(f"{what} is {value!r}; it must be {either(known)}.")
+    return kind(value)
 
 
 def either(names: Sequence[str]) -> str:

@@ -1,6 +1,7 @@
 """Units at the boundary: SI inside, milliseconds and degrees only where a person writes them."""
 
 import math
+from numbers import Real
 
 from sealag.errors import InputError
 
@@ -75,6 +76,8 @@ def check_delay_s(value_s: float, name: str) -> float:
     Raises:
         InputError: it is not finite, negative, or longer than LONGEST_DELAY_S.
     """
+    if not isinstance(value_s, Real) or isinstance(value_s, bool):
+        raise InputError(f"{name} is {value_s!r}; a number of seconds is right.")
     if not math.isfinite(value_s) or value_s < 0.0:
         raise InputError(f"{name} is {value_s} s; a delay must be finite and not negative.")
     if value_s > LONGEST_DELAY_S:

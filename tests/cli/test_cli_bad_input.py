@@ -350,19 +350,16 @@ def test_usage_problem_is_one_sentence(name, capsys, tmp_path, monkeypatch):
 
 def test_pushes_that_do_not_act_are_refused(tmp_path, capsys):
     push = '[[simulation.pushes]]\nframe = "torso"\nforce_n = [1.0, 0.0, 0.0]\n{}\n[delays]'
-    for times, word in (
-        ("start_s = 5.0\nduration_s = 0.1", "ends at"),
-        ("start_s = 0.01\nduration_s = 1e-5", "physics step"),
-    ):
+    path = project(tmp_path, ("[delays]", push.format("start_s = 5.0\nduration_s = 0.1")))
+    err = fails(capsys, "simulate", path, "--scenario", "regulate", "--duration", "0.05")
+    assert "torso" in err
+    assert "ends at" in err
+    for times in ("start_s = 0.001\nduration_s = 0.1", "start_s = 0.001\nduration_s = 1e-5"):
         path = project(tmp_path, ("[delays]", push.format(times)))
-        err = fails(capsys, "simulate", path, "--scenario", "regulate", "--duration", "0.05")
-        assert "torso" in err
-        assert word in err
-    path = project(tmp_path, ("[delays]", push.format("start_s = 0.001\nduration_s = 0.1")))
-    with pytest.raises(SystemExit) as stop:
-        out = str(tmp_path / "o.mcap")
-        main(["simulate", str(path), "--scenario", "drop", "--duration", "0.002", "--out", out])
-    assert stop.value.code == 0
+        with pytest.raises(SystemExit) as stop:
+            out = str(tmp_path / "o.mcap")
+            main(["simulate", str(path), "--scenario", "drop", "--duration", "0.002", "--out", out])
+        assert stop.value.code == 0
 
 
 def test_help_is_shown_without_a_command(capsys):

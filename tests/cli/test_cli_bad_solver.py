@@ -23,9 +23,12 @@ BAD = {
 
 
 def late(system, d_1):
-    """The same design with another constant total delay, s."""
-    plain_delays = replace(system.delays, sample_time=0.0)
-    return replace(system, delays=plain_delays.scaled(d_1 / plain_delays.d_1))
+    """The same design with another constant total delay, s, its controller's hold in it."""
+    bare = replace(system.delays, sample_time=0.0)
+    hold = bare.sampled().d_1 - bare.d_1
+    found = replace(system, delays=bare.scaled((d_1 - hold) / bare.d_1))
+    assert found.delays.d_1 == pytest.approx(d_1, rel=1e-12)
+    return found
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sealag
-from oracle.black_box.loop import BlackBox
+from oracle.black_box.box import BlackBox
 from oracle.black_box.roots import Late, roots
 from oracle.black_box.run import deviation, growth
 

@@ -47,6 +47,14 @@ CASES = [
 ]
 """Design, signal, gravity, and how many configurations are compared."""
 
+COUPLED = 1e-4
+"""Share of the command that motions of links may have. Differences of it over 1e-5 rad leave 8e-5
+where springs have 2e4 Nm/rad and a tank's error is stiff; on a point foot it is more than 1e-2."""
+
+NEAR = 1e4
+"""Ratio of the largest to the smallest direction of J*, those lost left out, from which a
+configuration lies within a difference's reach of one that loses a direction."""
+
 
 def clamped(frame):
     return Contact(frame=frame, kind=ContactKind.SURFACE)
@@ -115,13 +123,18 @@ def at_minimum(system, motion, spaces, k):
     return values[0] > 1e-9 * values[-1]
 
 
+def nearly_singular(J_star):
+    values = np.linalg.svd(J_star)[1]
+    return values[0] > NEAR * values[values > 1e-9 * values[0]].min()
+
+
 @functools.cache
 def compared(name, signal, gravity, wanted):
     """The first so many configurations that are certified and stable; none that cannot be told."""
     system, motion, spaces, certified, published = bounds_of(name, signal, gravity)
     found = []
     for k in np.flatnonzero(certified.delay > 0.0):
-        if not at_minimum(system, motion, spaces, k):
+        if not at_minimum(system, motion, spaces, k) or nearly_singular(spaces.J_star[k]):
             continue
         loop = system.frozen(motion, k, rest=system.in_posture(motion, k))
         try:
@@ -148,7 +161,7 @@ def exceeding(found, bound):
 def test_certified_and_stable_never_exceeds_the_margin(case):
     found = compared(*case)
     assert len(found) == case[-1], f"only {len(found)} of {DRAWS} were certified and stable"
-    assert all(answer_to_links(one.loop) < 1e-6 for one in found)
+    assert all(answer_to_links(one.loop) < COUPLED for one in found)
     assert exceeding(found, lambda one: one.certified) == 0
     longer = exceeding(found, lambda one: 1.3 * one.margin)
     assert longer == len(found), "the comparison must see a delay that is too long"
@@ -179,6 +192,7 @@ def test_a_biped_on_point_feet_is_passive_and_never_stable():
         assert not at_minimum(system, motion, spaces, k)
         loop = system.frozen(motion, k, rest=system.in_posture(motion, k))
         assert np.linalg.eigvals(loop.A_0 + loop.A_1).real.max() > 0.1
+        assert answer_to_links(loop) > 100.0 * COUPLED
 
 
 @pytest.mark.parametrize("name", ["clamped hume", "anymal", "hume on point feet"])

@@ -2,10 +2,11 @@
 
 import math
 
+import flint
 import numpy as np
 import pytest
 
-from sealag.margin import delay_margin
+from sealag.margin import delay_margin, random_sea_plant, rightmost_roots
 
 
 @pytest.mark.parametrize("excess", [1e-3, 1e-8, 1e-12, 2.0**-52])
@@ -72,3 +73,70 @@ def test_crossings_that_almost_touch_have_directions(copies: int, excess: float)
 def test_what_almost_touches_from_the_other_side_has_no_crossing() -> None:
     answer = delay_margin([[0, 1], [-1, -1]], [[0, 0], [0, -(1.0 - 1e-9)]])
     assert (answer.delay, answer.guaranteed) == (math.inf, True)
+
+
+def _off(A_0, A_1, delay: float, frequency: float) -> float:
+    """Newton's relative step to det(jω − A_0 − e^{-jφ} A_1) = 0 with φ = ωd, in 300 bits."""
+    n, small = len(A_0), flint.arb(2) ** -120
+
+    def determinant(phi: flint.arb, omega: flint.arb) -> flint.acb:
+        turned = flint.acb(0, -phi).exp()
+        rows = [
+            [flint.acb(-A_0[i, j], omega * (i == j)) - turned * A_1[i, j] for j in range(n)]
+            for i in range(n)
+        ]
+        return flint.acb_mat(rows).det()
+
+    with flint.ctx.workprec(300):
+        omega = flint.arb(frequency)
+        phi = omega * flint.arb(delay)
+        here = determinant(phi, omega)
+        by_phi = (determinant(phi + small, omega) - here) / small
+        by_omega = (determinant(phi, omega + small) - here) / small
+        area = (by_omega.conjugate() * by_phi).imag
+        steps = (
+            (by_omega.conjugate() * here).imag / area / phi,
+            (here * by_phi.conjugate()).imag / area / omega,
+        )
+        return max(abs(float(step.mid())) for step in steps)
+
+
+@pytest.mark.parametrize("slow", [1e-4, 1e-6])
+@pytest.mark.parametrize("seed", [0, 3, 5, 9])
+def test_slow_root_beside_fast_ones_is_refined(seed: int, slow: float) -> None:
+    """ẋ = −s (x + 1.5 x(t − d)), ω = s √1.25, mixed with modes up to 2000 1/s."""
+    T = np.random.default_rng(seed).normal(size=(6, 6))
+    loop = (
+        np.diag([-slow, -30.0, -100.0, -300.0, -1000.0, -2000.0]),
+        np.diag([-1.5 * slow, 1.0, 2.0, -3.0, 4.0, -5.0]),
+    )
+    mixed = tuple(np.linalg.solve(T, A @ T) for A in loop)
+    answer = delay_margin(*mixed)
+    assert answer.guaranteed
+    assert len(answer.crossings) == 1
+    omega = slow * math.sqrt(1.25)
+    assert answer.delay == pytest.approx(math.acos(-1.0 / 1.5) / omega, rel=1e-4)
+    assert _off(*mixed, answer.delay, answer.frequency) < 1e-6
+
+
+@pytest.mark.parametrize(("seed", "count"), [(406, 3), (927, 4), (937, 4)])
+def test_crossing_of_a_soft_direction_is_refined(seed: int, count: int) -> None:
+    plant = random_sea_plant(seed)
+    answer = delay_margin(plant.A_0, plant.A_1, symmetries=plant.symmetries)
+    assert answer.guaranteed
+    assert len(answer.crossings) == count
+    one = answer.crossings[-1]
+    assert _off(plant.A_0, plant.A_1, one.delay, one.frequency) < 1e-9
+    assert _off(plant.A_0, plant.A_1, (1.0 + 2e-9) * one.delay, one.frequency) > 1e-9
+
+
+def test_roots_confirm_the_margin_beside_a_slow_crossing() -> None:
+    plant = random_sea_plant(927)
+    answer = delay_margin(plant.A_0, plant.A_1)
+    assert answer.unstable_roots == (np.linalg.eigvals(plant.A_0 + plant.A_1).real >= 0.0).sum()
+    below, above = (
+        rightmost_roots(plant.A_0, plant.A_1, share * answer.delay)[0] for share in (0.999, 1.0)
+    )
+    assert below.real < 0.0
+    assert above.real == pytest.approx(0.0, abs=1e-8)
+    assert abs(above.imag) == pytest.approx(answer.frequency, rel=1e-8)

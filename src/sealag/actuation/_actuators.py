@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.errors import InputError
+from sealag.robot import Robot
 from sealag.typing import Array, ArrayLike
 
 
@@ -106,6 +107,31 @@ def actuators(
     )
 
 
+def actuators_of(robot: Robot, **values: ArrayLike) -> Actuators:
+    """Build a robot's actuators; limits and friction that are not given are those of its URDF.
+
+    A speed limit of 0 in a URDF forbids every motion: it stands for one that is not known.
+
+    Args:
+        robot: the robot.
+        values: as `actuators` takes them, one number for all joints or (n,). A NaN among
+            torque_limit, velocity_limit or coulomb_friction stands for the URDF's value.
+
+    Raises:
+        InputError: as `actuators` raises it.
+    """
+    moving = np.where(robot.velocity_limit > 0.0, robot.velocity_limit, np.inf)
+    for name, own in (
+        ("torque_limit", robot.effort_limit),
+        ("velocity_limit", moving),
+        ("coulomb_friction", robot.friction),
+    ):
+        given = np.asarray(values.get(name, np.nan))
+        if given.dtype.kind in "fiu" and given.shape in ((), own.shape):
+            values[name] = np.where(np.isnan(given), own, given)
+    return actuators(robot.joints, **values)  # pyright: ignore[reportCallIssue]
+
+
 def joint_values(
     joints: Sequence[str], values: ArrayLike, *, name: str, positive: bool, finite: bool = True
 ) -> Array:
@@ -122,7 +148,10 @@ def joint_values(
         InputError: the length is wrong, or a value is NaN, infinite, negative or 0; the message
             names the joint.
     """
-    array = np.asarray(values, dtype=float)
+    given = np.asarray(values)
+    if given.dtype.kind not in "fiu":
+        raise InputError(f"{name} is {values!r}; one number, or one for each joint, is right.")
+    array = given.astype(float)
     if array.ndim == 0:
         array = np.full(len(joints), float(array))
     if array.shape != (len(joints),):

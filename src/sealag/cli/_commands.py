@@ -108,7 +108,7 @@ def _stability(certificate: Certificate) -> str:
     """What is known of stability without delay, which a passive loop need not have."""
     if certificate.unstable_modes:
         count = certificate.unstable_modes
-        return f"no: {count} root{'s' * (count > 1)} unstable without delay"
+        return f"no: {count} root{'s' * (count > 1)} without decay, already without delay"
     if certificate.stable is None:
         return "not known"
     return "yes" if certificate.stable else "no"
@@ -140,6 +140,8 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         rows.insert(4, ("with matrices that move", time_text(certificate.time_varying_delay_s)))
     for name, value in rows:
         print(f"{name:26} {value}")
+    if certificate.status is Status.CERTIFIED and certificate.stable is not True:
+        print("passive, but not stable by itself: without other means the robot falls or drifts")
     for reason in certificate.reasons:
         print(f"not certified because {reason}")
     for bound, reason in certificate.left_open.items():
@@ -171,8 +173,9 @@ def margin_project(
         return
     print(f"{'local margin':26} {time_text(found.delay_s)}")
     print(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
-    print(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
-    print(f"{'unstable without delay':26} {found.unstable_modes} roots")
+    if found.frequency_rad_s is not None:
+        print(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
+    print(f"{'without decay':26} {found.unstable_modes} of the roots without delay")
     print(f"{'neutral by symmetry':26} {found.neutral} roots")
     print(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
     mode = sorted(found.mode.items(), key=lambda item: -item[1])

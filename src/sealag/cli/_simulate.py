@@ -196,7 +196,8 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
     if books.delay_injection is not None and books.law_injection is not None:
         within = f"within {answer['injection_error_j']:.1e} J"
         print(f"{'injected by the delay':26} {answer['delay_injection_j']:.4g} J at most, {within}")
-        print(f"{'injected by moving law':26} {answer['law_injection_j']:.4g} J at most, {within}")
+        moved = abs(answer["law_injection_j"])
+        print(f"{'injected by moving law':26} {moved:.4g} J at most, {within}")
     if books.delay_storage is not None:
         print(
             f"{'stored in the delay, V_4':26} {answer['delay_storage_j']:.4g} J at most, within "

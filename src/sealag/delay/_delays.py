@@ -231,4 +231,9 @@ class Delays:
 
 
 def _round_trip(signal: RoundTrip | DelaySignal) -> RoundTrip:
+    if not hasattr(signal, "upper_bound"):
+        raise InputError(
+            f"A connection's delay is {signal!r}; a signal such as Constant(0.008), in s, or a "
+            "RoundTrip is right."
+        )
     return signal if isinstance(signal, RoundTrip) else RoundTrip.halved(signal)

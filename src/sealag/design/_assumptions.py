@@ -69,7 +69,7 @@ def _of_stability(motion: Motion, local: Local) -> Iterator[tuple[str, str]]:
             f"{local.count(Basis.OPEN)}.",
         )
     if local.problem:
-        yield "critical_instant", f"At the critical instant {local.problem}."
+        yield "critical_instant", f"At the critical instant {local.problem.rstrip('.')}."
 
 
 def _of_delays(system: System) -> Iterator[tuple[str, str]]:
@@ -99,8 +99,8 @@ def _of_delays(system: System) -> Iterator[tuple[str, str]]:
         )
     yield (
         "one_delay",
-        "The ways up and down count by their sum d_1; d_2 delays the feedforward and moves no "
-        "root.",
+        "The ways up and down count by their sum d_1; d_2 delays the feedforward of a "
+        "moving reference (velocity_feedforward) and moves no root.",
     )
     if not delays.delayed_torque_feedback:
         yield (
@@ -163,6 +163,21 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
             "coulomb_friction",
             "Coulomb friction (coulomb_friction, or the URDF's friction, taken at the motor) only "
             "dissipates; it leaves a static error, and the local margin is that of sliding motors.",
+        )
+    left_out = [
+        name
+        for name, stated, used in (
+            ("effort", robot.effort_limit, drives.torque_limit),
+            ("velocity", robot.velocity_limit, drives.velocity_limit),
+        )
+        if (np.isfinite(stated) & (stated > 0.0) & np.isinf(used)).any()
+    ]
+    if (robot.friction > 0.0).any() and not drives.coulomb_friction.any():
+        left_out.append("friction")
+    if left_out:
+        yield (
+            "urdf_left_out",
+            f"The URDF's {', '.join(left_out)} is left out; actuators_of takes it over.",
         )
     if (robot.effort_limit == 0.0).any() or (robot.velocity_limit == 0.0).any():
         zero = (robot.effort_limit == 0.0) | (robot.velocity_limit == 0.0)

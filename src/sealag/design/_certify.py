@@ -82,12 +82,12 @@ def certify(
         UnknownNameError: a frame or joint does not exist.
     """
     kind = check_question(system, motion, criterion, time_varying=time_varying, proofs=proofs)
-    rest = system.rest() if motion is None else None
     motion = system.still() if motion is None else motion
+    rest = system.rest(motion) if len(motion) == 1 else None
     spaces = system.spaces(motion)
     published = published_bounds(spaces, system, solver=solver)
     printed = kind is Criterion.PUBLISHED
-    passive = certified_bounds(spaces, system, rest)
+    passive = certified_bounds(spaces, system, rest, motion)
     bounds = published if printed else passive
     shared = not printed and len(motion) > 1 and not bounds.reasons
     common = common_multiplier(system, bounds, solver=solver) if shared else None
@@ -106,7 +106,7 @@ def certify(
     if missing:
         bounds, common, moving = without(bounds, missing), None, None
     decided = passive if kind is Criterion.CERTIFIED else without_bounds(passive)
-    local = local_of(system, motion, spaces, decided)
+    local = local_of(system, motion, spaces, decided, rest)
     return Certificate(
         **_answer(
             system,
@@ -195,7 +195,7 @@ def design_entries(system: System) -> dict[str, Any]:
         "torque_bandwidth": [_finite(value) for value in drives.torque_bandwidth],
         "hashes": {
             "urdf": system.robot.urdf_sha256,
-            "project": "" if system.source is None else system.source.sha256,
+            "project": system.sha256,
         },
     }
 

@@ -13,6 +13,7 @@ from sealag.passivity import (
     max_delay_from_stiffness,
     max_delay_multitask,
 )
+from sealag.robot import Motion
 from sealag.typing import Array, BoolArray
 from sealag.units import time_text
 from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError, relative_asymmetry
@@ -51,7 +52,9 @@ class Bounds:
     left_open: str = ""
 
 
-def certified_bounds(spaces: Spaces, system: System, rest: Rest | None = None) -> Bounds:
+def certified_bounds(
+    spaces: Spaces, system: System, rest: Rest | None = None, motion: Motion | None = None
+) -> Bounds:
     """Bound of THEORY section 6 for the law that is run.
 
     Sufficient for a passive controller side along the frozen motion: the signal is one that a
@@ -63,9 +66,10 @@ def certified_bounds(spaces: Spaces, system: System, rest: Rest | None = None) -
         spaces: the law's matrices.
         system: the design.
         rest: where the loop rests in its posture; None for a motion.
+        motion: whose speeds the motors must reach; None for a posture.
     """
     good, reasons = np.ones(len(spaces), dtype=bool), list[str]()
-    for refused, words in _refusals(spaces, system, rest):
+    for refused, words in _refusals(spaces, system, rest, motion):
         if (good & refused).any():
             reasons.append(words)
             good &= ~refused
@@ -80,7 +84,9 @@ def certified_bounds(spaces: Spaces, system: System, rest: Rest | None = None) -
     )
 
 
-def _refusals(spaces: Spaces, system: System, rest: Rest | None) -> Iterator[tuple[BoolArray, str]]:
+def _refusals(
+    spaces: Spaces, system: System, rest: Rest | None, motion: Motion | None
+) -> Iterator[tuple[BoolArray, str]]:
     """Instants (N,) at which the criterion does not hold, and why, in words."""
     count, everywhere = len(spaces), np.ones(len(spaces), dtype=bool)
     signal = system.law.signal.refusal(spaces.contraction)
@@ -97,6 +103,16 @@ def _refusals(spaces: Spaces, system: System, rest: Rest | None) -> Iterator[tup
             (
                 f"the motor of {joint} gives at most {limit:g} Nm, and gravity asks for "
                 f"{load.max():.3g} Nm at {(load > limit).sum()} of {count} instants"
+            ),
+        )
+    for i, joint in enumerate(system.robot.joints):
+        limit = system.actuators.velocity_limit[i]
+        speed = np.abs(np.zeros(count) if motion is None else motion.v[:, system.robot.nv_base + i])
+        yield (
+            speed > limit,
+            (
+                f"the motor of {joint} reaches at most {limit:g} rad/s or m/s, and the motion asks "
+                f"for {speed.max():.3g} at {(speed > limit).sum()} of {count} instants"
             ),
         )
     yield (

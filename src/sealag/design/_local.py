@@ -88,7 +88,11 @@ class Local:
         return float(self.margin.first_crossing)
 
     def undercut(self, bounds: Array) -> list[int]:
-        """Return the instants whose exact margin lies below their bound (N,)."""
+        """Return the instants whose exact margin lies below their bound.
+
+        Args:
+            bounds: (N,) s.
+        """
         return [
             k
             for k, one in enumerate(self.instants)
@@ -96,16 +100,23 @@ class Local:
         ]
 
     def count(self, basis: Basis) -> int:
-        """Return how many instants were decided in a way."""
+        """Return how many instants were decided in a way.
+
+        Args:
+            basis: the way.
+        """
         return sum(one.basis is basis for one in self.instants)
 
 
-def local_of(system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> Local:
+def local_of(
+    system: System, motion: Motion, spaces: Spaces, bounds: Bounds, rest: Rest | None = None
+) -> Local:
     """Decide stability and margin of the law that runs at every instant of a motion.
 
     Each instant is a loop that holds the instant's configuration. It is frozen in that
     configuration and, where the law sags, where it rests with the references as they are; the
-    smaller margin counts. Where the law has a potential, rests at the instant itself, joints
+    smaller margin counts. An instant of a motion that is unstable in its configuration is not
+    looked at elsewhere. Where the law has a potential, rests at the instant itself, joints
     determine all motions and the drives are ideal, a strict minimum of the potential is stable
     without delay, and the passive bound lies below the margin (V̇ ≤ 0 for delays up to it): such an
     instant is decided exactly only if its bound lies below the smallest margin known. All others
@@ -116,8 +127,9 @@ def local_of(system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> 
         motion: its instants.
         spaces: the law's matrices along it.
         bounds: of the certified criterion.
+        rest: where the loop of the first instant rests, if that is known already.
     """
-    return _Decision(system, motion, spaces, bounds).run()
+    return _Decision(system, motion, spaces, bounds, rest).run()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,8 +161,16 @@ class _Known:
 class _Decision:
     """What is known so far."""
 
-    def __init__(self, system: System, motion: Motion, spaces: Spaces, bounds: Bounds) -> None:
+    def __init__(
+        self,
+        system: System,
+        motion: Motion,
+        spaces: Spaces,
+        bounds: Bounds,
+        first: Rest | None,
+    ) -> None:
         self._system, self._motion, self._spaces, self._bounds = system, motion, spaces, bounds
+        self._first = first
         self._found: list[InstantMargin] = [OPEN] * len(motion)
         self._best: _Known | None = None
         self._critical = 0
@@ -205,12 +225,20 @@ class _Decision:
         else:
             self._found[k] = InstantMargin(basis=Basis.SEARCHED, delay=least)
 
+    def _rest_of(self, k: int) -> Rest:
+        """Where the loop that holds an instant rests."""
+        if self._first is not None and k == 0:
+            return self._first
+        return self._system.rest(self._motion, k)
+
     def _decide(self, k: int) -> bool:
         """Decide an instant exactly; return whether it is unstable without delay."""
-        states = {Place.POSTURE: self._system.in_posture(self._motion, k)}
-        if not (self._system.law.rests_at_posture and states[Place.POSTURE].found):
-            states[Place.REST] = self._system.rest(self._motion, k)
-        worst = min((self._at(k, *state) for state in states.items()), key=_Known.order)
+        known = [self._at(k, Place.POSTURE, self._system.in_posture(self._motion, k))]
+        settled = self._system.law.rests_at_posture and known[0].rest.found
+        lost = len(self._motion) > 1 and known[0].delay == 0.0
+        if not (settled or lost):
+            known.append(self._at(k, Place.REST, self._rest_of(k)))
+        worst = min(known, key=_Known.order)
         unstable = worst.delay == 0.0
         if worst.delay is not None:
             self._found[k] = InstantMargin(

@@ -1,6 +1,6 @@
 """The project file: read, checked key by key, and turned into a System."""
 
-import hashlib
+import math
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sealag.actuation import Actuators, actuators
+from sealag.actuation import Actuators, actuators_of
 from sealag.delay import (
     Constant,
     Delays,
@@ -105,7 +105,7 @@ def parse_project(content: bytes, path: Path) -> Any:
 
     try:
         data = tomllib.loads(content.decode("utf-8-sig"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # also of integers with thousands of digits
         raise ProjectError(f"{path} is not TOML: {error}.") from error
     try:
         return Project.model_validate(data)
@@ -160,7 +160,6 @@ def _system(project: Any, path: Path, text: str) -> System:
         walking=walking_of(project.walking, robot),
         source=Source(
             text=text,
-            sha256=hashlib.sha256(text.encode()).hexdigest(),
             files=tuple(file for file in files if file is not None),
             motion_file=motion_file,
         ),
@@ -252,32 +251,16 @@ def _actuators(section: Any, robot: Robot, path: Path) -> Actuators:
     optional = {key for values in every for key in values} - set(_REQUIRED)
     for key in _REQUIRED:
         columns[key] = [values[key] for values in every]
-    for key in optional | set(_OF_URDF):
-        fallback = _fallback(key, robot)
-        columns[key] = [values.get(key, own) for values, own in zip(every, fallback, strict=True)]
-    return actuators(robot.joints, **columns)
+    for key in optional:
+        columns[key] = [values.get(key, _left_out(key)) for values in every]
+    return actuators_of(robot, **columns)
 
 
-_OF_URDF = ("torque_limit", "velocity_limit", "coulomb_friction")
-"""Keys of actuators whose values the URDF states where the project does not."""
-
-
-def _fallback(key: str, robot: Robot) -> Array:
-    """What holds for joints (n,) at which the project does not give a key.
-
-    A velocity limit of 0 in a URDF forbids every motion: it stands for one that is not known.
-    """
-    match key:
-        case "torque_limit":
-            return robot.effort_limit
-        case "velocity_limit":
-            return np.where(robot.velocity_limit > 0.0, robot.velocity_limit, np.inf)
-        case "coulomb_friction":
-            return robot.friction
-        case "torque_bandwidth":
-            return np.full(robot.n, np.inf)
-        case _:
-            return np.zeros(robot.n)
+def _left_out(key: str) -> float:
+    """What stands for a key that is given for other joints only; NaN for what the URDF states."""
+    if key in ("torque_limit", "velocity_limit", "coulomb_friction"):
+        return math.nan
+    return math.inf if key == "torque_bandwidth" else 0.0
 
 
 def _delays(section: Any, folder: Path, path: Path) -> Delays:

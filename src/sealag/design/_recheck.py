@@ -10,6 +10,7 @@ import numpy as np
 from sealag.design._certify import certify
 from sealag.design._criteria import certified_bounds, published_bounds
 from sealag.design._system import System
+from sealag.errors import InputError
 from sealag.passivity import Check, Criterion, Verification, read_certificate, verify
 from sealag.robot import Motion
 from sealag.typing import Array
@@ -62,6 +63,10 @@ def verify_design(
     """
     found = verify(certificate, exact=exact)
     data = certificate if isinstance(certificate, dict) else read_certificate(Path(certificate))
+    if motion is None and data["instants"] > 1:
+        raise InputError(
+            f"The certificate is of a motion of {data['instants']} instants; name it (--motion)."
+        )
     checks = found.checks
     if found.valid:
         checks += tuple(_recomputed(data, system, motion))
@@ -85,12 +90,13 @@ def _recomputed(data: dict[str, Any], system: System, motion: Motion | None) -> 
     if data["time_s"] != fresh["time_s"]:
         return
     spaces = system.spaces(motion)
-    rest = system.rest() if motion is None else None
+    motion = system.still() if motion is None else motion
+    rest = system.rest(motion) if len(motion) == 1 else None
     kind = Criterion(data["criterion"])
     bounds = (
         published_bounds(spaces, system)
         if kind is Criterion.PUBLISHED
-        else certified_bounds(spaces, system, rest)
+        else certified_bounds(spaces, system, rest, motion)
     )
     held = {proof["instant"]: proof for proof in fresh["proofs"]}
     for proof in data["proofs"]:

@@ -302,6 +302,12 @@ def _clock(system: System) -> Clock:
     if system.simulation.physics_step_ms is not None:
         step = system.simulation.physics_step_ms * 1e-3
         return Clock(physics=step, embedded=embedded, central=central)
+    if embedded and abs(central / embedded - round(central / embedded)) > 1e-9:
+        raise InputError(
+            f"The central period of {central * 1e3:g} ms (delays.sample_time_ms) is no whole "
+            f"multiple of the embedded one of {embedded * 1e3:g} ms (delays.embedded_period_ms), "
+            "as a run needs it; change one of them."
+        )
     rate, _ = fastest_link(system.robot, system.actuators, system.posture)
     longest = max(SHORTEST_STEP, 2.0 * math.pi / (STEPS_PER_SWING * rate))
     whole = embedded or central

@@ -1,5 +1,6 @@
 """A design: robot, actuators, law, contacts, posture and delays."""
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,13 +38,11 @@ class Source:
 
     Attributes:
         text: the file's own text, which recordings carry along.
-        sha256: of the file.
         files: everything that was read: project, URDF, motion, delay samples.
         motion_file: the project's own motion, if it names one.
     """
 
     text: str
-    sha256: str
     files: tuple[Path, ...]
     motion_file: Path | None
 
@@ -122,6 +121,11 @@ class System:
     def text(self) -> str:
         """The project file's text; empty if it was built in Python."""
         return "" if self.source is None else self.source.text
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the project file's text; of the empty text if it was built in Python."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
 
     @property
     def motion_file(self) -> Path | None:

@@ -7,13 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.margin._family import Curve, Family
-from sealag.margin._loop import Loop, exact_determinant, rational
+from sealag.margin._loop import Complex, Loop, exact_determinant, rational
 from sealag.margin._pictures import Picture
 from sealag.margin._search import Band, Passage
 from sealag.typing import Array
 
 _TOUCHING = 1e-6
 _STEPS = 40
+_CORRECTIONS = 2
+_CONVERGED = 1e-9
+_BESIDE = 0.005
+_FINEST = float(np.finfo(np.longdouble).eps)
 _SAME = 1e-11
 _ON_AXIS = 1e-7
 
@@ -131,10 +135,14 @@ def _in_passage(picture: Picture, part: Passage, curve: Curve) -> Found:
 
 
 def _belongs(picture: Picture, part: Passage, curve: Curve, point: _Point) -> bool:
-    """Whether a refined point is on the curve and in its part, ends included."""
+    """Whether a refined point is on the curve and in its part or next to an end.
+
+    Rounding may put a crossing at an end on either side. The curve's bounds leave room for it: a
+    hundredth further it still meets the axis at most once, so that both parts find one point.
+    """
     family, k = part.family, curve.index
     t = picture.parameter(point.phi, point.omega)
-    slack = 1e-13 * max(abs(part.lower), abs(part.upper))
+    slack = _BESIDE * (part.upper - part.lower)
     if not part.lower - slack <= t <= part.upper + slack:
         return False
     placed = picture.value(point.phi, point.omega)
@@ -249,53 +257,74 @@ def _reported(loop: Loop, point: _Point, *, touching: bool) -> Found:
 
 
 class _Border(NamedTuple):
-    """P v = −b g with c v = 1: g is zero where P is singular; its derivatives, and dλ/dφ."""
+    """P v = −b g with c v = 1: g is zero where P is singular; its derivatives, and dλ/dφ.
 
-    g: complex
+    `blur` is what rounding leaves of g.
+    """
+
+    g: np.clongdouble
+    blur: float
     by_root: complex
     by_turn: complex
     v: Array
     slope: complex
 
 
-def _border(loop: Loop, phi: float, root: complex, *, left: Array, right: Array) -> _Border:
+def _border(
+    loop: Loop, phi: float | np.longdouble, root: Complex, *, left: Array, right: Array
+) -> _Border:
+    """Solve the bordered system, and correct v and g by their residual in extended precision.
+
+    Doubles leave g an error that turns a slow root beside a fast loop by ε size/ω: more than a
+    crossing may be off.
+    """
     n = len(loop.A_0)
-    z = np.exp(-1j * phi)
-    P, slope = loop.characteristic(root, z)
-    K = np.zeros((n + 1, n + 1), dtype=complex)
+    z = np.exp(-1j * np.longdouble(phi))
+    P, slope = loop.characteristic(np.clongdouble(root), z)
+    K = np.zeros((n + 1, n + 1), dtype=np.clongdouble)
     K[:n, :n] = P
     K[:n, n] = right * (loop.size / np.linalg.norm(right))
     K[n, :n] = left * (loop.size / np.linalg.norm(left))
-    inverse = np.linalg.inv(K)
-    v, y = inverse[:n, n], inverse[n, :n]
-    by_root = complex(-(y @ slope @ v))
-    by_turn = complex(-1j * z * (y @ loop.A_1 @ v))
-    return _Border(complex(inverse[n, n]), by_root, by_turn, v, slope=-by_turn / by_root)
+    inverse = np.linalg.inv(K.astype(complex))
+    wide = inverse[:, n].astype(np.clongdouble)
+    for _ in range(_CORRECTIONS):
+        residual = K @ wide
+        residual[n] -= 1.0
+        wide -= inverse @ residual.astype(complex)
+    v, y = wide[:n].astype(complex), inverse[n, :n]
+    by_root = complex(-(y @ slope.astype(complex) @ v))
+    by_turn = complex(-1j * complex(z) * (y @ loop.A_1 @ v))
+    blur = (n + 4) * _FINEST * loop.size * float(np.linalg.norm(y) * np.linalg.norm(v))
+    return _Border(wide[n], blur, by_root, by_turn, v, slope=-by_turn / by_root)
 
 
 def _newton(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -> _Point | None:
-    """Newton's method on g(jω, φ) = 0 in the real unknowns φ and ω."""
+    """Newton's method on g(jω, φ) = 0 in the real unknowns φ and ω, until rounding stops it."""
     best: tuple[float, float, float, _Border] | None = None
+    allowed = _CONVERGED
+    turn, height = np.longdouble(phi), np.longdouble(omega)
     try:
         for _ in range(_STEPS):
-            border = _border(loop, phi, 1j * omega, left=left, right=right)
+            border = _border(loop, turn, 1j * height, left=left, right=right)
             across = 1j * border.by_root
             area = (across.conjugate() * border.by_turn).imag
             if area == 0.0:
                 return None
             step_phi = (across.conjugate() * -border.g).imag / area
             step_omega = (-border.g * border.by_turn.conjugate()).imag / -area
-            moved = max(abs(step_phi), abs(step_omega) / loop.size)
+            moved = float(max(abs(step_phi), abs(step_omega) / loop.size))
             if best is not None and not moved < best[0]:
                 break
-            best = moved, phi, omega, border
-            phi, omega = phi + step_phi, omega + step_omega
+            best = moved, float(turn), float(height), border
+            rates = max(abs(border.by_root), abs(border.by_turn) / loop.size)
+            allowed = max(_CONVERGED, 4.0 * border.blur * rates / abs(area))
+            turn, height = turn + step_phi, height + step_omega
             if moved <= 1e-16:
                 break
     except np.linalg.LinAlgError:
         if best is None:
             return None
-    if best is None or best[0] > 1e-9:
+    if best is None or best[0] > allowed:
         return None
     return _point(loop, best[1], best[2], slope=best[3].slope, mode=best[3].v)
 
@@ -303,7 +332,7 @@ def _newton(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) 
 def _touch(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -> _Point | None:
     """Secant method on the slope of Re λ(φ): the turn at which a root touches the axis."""
 
-    def follow(at: float, root: complex) -> tuple[complex, _Border]:
+    def follow(at: float, root: Complex) -> tuple[Complex, _Border]:
         for _ in range(_STEPS):
             border = _border(loop, at, root, left=left, right=right)
             step = -border.g / border.by_root
@@ -316,7 +345,7 @@ def _touch(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -
         return border.slope.real
 
     try:
-        root, border = follow(phi, 1j * omega)
+        root, border = follow(phi, 1j * np.longdouble(omega))
         other = phi + 1e-6
         beside = rate(follow(other, root)[1])
         for _ in range(_STEPS):
@@ -332,7 +361,7 @@ def _touch(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -
         return None
     if abs(root.real) > _ON_AXIS * abs(border.slope):
         return None
-    return _point(loop, phi, root.imag, slope=border.slope, mode=border.v)
+    return _point(loop, phi, float(root.imag), slope=border.slope, mode=border.v)
 
 
 def _point(loop: Loop, phi: float, omega: float, *, slope: complex, mode: Array) -> _Point:

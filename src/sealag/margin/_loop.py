@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from sealag.typing import Array, ArrayLike
 if TYPE_CHECKING:
     from flint import fmpq
 
+Complex: TypeAlias = complex | np.clongdouble
 EPS = float(np.finfo(float).eps)
 _STRUCTURE = 1e-8
 _RANK = 1e-13
@@ -51,7 +52,7 @@ class Loop:
         """Whether a part with a fixed delay is left."""
         return self.embedded_delay > 0.0
 
-    def characteristic(self, root: complex, z: complex) -> tuple[Array, Array]:
+    def characteristic(self, root: Complex, z: Complex) -> tuple[Array, Array]:
         """Return P = λ − A_0 − z A_1 − A_e e^{-λe} at λ = root, and ∂P/∂λ, both (n, n)."""
         identity = np.eye(len(self.A_0))
         P = root * identity - self.A_0 - z * self.A_1

@@ -218,6 +218,11 @@ def _margin(loop: Loop, *, longest: float) -> DelayMargin:
         )  # fmt: skip
     zero_root = on_axis and has_zero_root(loop)
     found = crossings_of(picture, *search(picture))
+    if unstable and not (found.explained or zero_root):  # the margin is 0 all the same
+        return replace(
+            _answer(loop, (), unstable=unstable, longest=longest),
+            first_crossing=math.nan, guaranteed=False,
+        )  # fmt: skip
     if not (found.explained or zero_root):
         raise SolverError(
             "A band of frequencies could be neither excluded nor refined to a crossing; the "

@@ -19,6 +19,7 @@ _ENDS = ("lower", "upper")
 _ENTRIES = ("ixx", "ixy", "ixz", "ixy", "iyy", "iyz", "ixz", "iyz", "izz")
 _INDEFINITE = 1e-6  # of a body's inertia: what rounding in a URDF does to a principal moment
 _PLACEHOLDER = 0.2  # of a body's inertia: sensors and covers fixed to public robots reach 0.15
+_MOST_DAMPING = 1e6  # Nms/rad, Nm: as in a project file; more is a slip of the unit
 
 
 def check_urdf(root: Element, path: Path) -> None:
@@ -138,10 +139,10 @@ def _check_joint(joint: Element, path: Path) -> None:
     if joint.get("type") != "fixed" and not any(map(number, ways.split())):
         raise RobotError(f"{path}: the axis of joint {name} is zero; it needs a direction.")
     for what, value in zip(("damping", "friction"), joint_dynamics(joint), strict=True):
-        if not 0.0 <= value < math.inf:
+        if not 0.0 <= value <= _MOST_DAMPING:
             raise RobotError(
-                f"{path}: the {what} of joint {name} is {value:g}; <dynamics> needs a finite "
-                "number of at least 0."
+                f"{path}: the {what} of joint {name} is {value:g}; <dynamics> needs a number in "
+                f"0 … {_MOST_DAMPING:g}."
             )
 
 

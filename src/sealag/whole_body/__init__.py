@@ -11,9 +11,9 @@ from sealag.whole_body._protocol import (
     TickController,
 )
 from sealag.whole_body._rest import Rest, posture_of, rest_of
+from sealag.whole_body._signal_states import LawDerivative, SignalState
 from sealag.whole_body._signals import (
     SIGNAL_NAMES,
-    LawDerivative,
     LinkAngles,
     MotorAngles,
     Refusal,
@@ -52,6 +52,7 @@ __all__ = [
     "Refusal",
     "Rest",
     "Signal",
+    "SignalState",
     "Spaces",
     "StaticJoint",
     "StaticJointState",

@@ -11,11 +11,15 @@ from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._law import Law
 from sealag.whole_body._links import FreeLinks, LinkPlant, norm, null_space
 from sealag.whole_body._rest import Rest
-from sealag.whole_body._signals import LawDerivative
+from sealag.whole_body._signal_states import LawDerivative
 
 _FELT = 1e-6
 """Share of the law's stiffness from which it counts as feeling a motion of the whole robot. Central
 differences leave 1e-9 where it feels none; a task that feels one feels it with its whole gain."""
+
+_KNOWN = 1e-9
+"""Share of the law's and the links' stiffness that central differences leave open: a motion that is
+held by less is held by nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,17 +141,22 @@ def freeze(
     command = law.signal.start(evaluation, delay_bound=0.0).derivative(rest.q, rest.theta)
     links = LinkPlant(robot, contacts).free(rest.q, rest.tau_sea)
     links, kept, C_z, B_z = _without_momentum(links, command)
+    memory = Memory(
+        A=command.A, B_z=B_z, B_theta=command.B_theta, B_rate=command.B_rate, C=command.C
+    )
+    S = links.Z[robot.nv_base :]
+    H, C_z, C_theta = _without_noise(
+        links.H, S, actuators.spring_stiffness, C_z=C_z, C_theta=command.C_theta, memory=memory
+    )
     return sea_loop(
         actuators,
         M=links.M,
-        H=links.H,
-        S=links.Z[robot.nv_base :],
+        H=H,
+        S=S,
         joint_damping=robot.damping,
         C_z=C_z,
-        C_theta=command.C_theta,
-        memory=Memory(
-            A=command.A, B_z=B_z, B_theta=command.B_theta, B_rate=command.B_rate, C=command.C
-        ),
+        C_theta=C_theta,
+        memory=memory,
         symmetries=kept,
         embedded_delay=embedded_delay,
     )
@@ -263,6 +272,36 @@ def _without_momentum(
     felt_by = felt_by @ Y
     n = len(command.C_q)
     return links, Y.T @ kept, felt_by[:n], felt_by[n:]
+
+
+def _without_noise(
+    H: Array, S: Array, K: Array, *, C_z: Array, C_theta: Array, memory: Memory
+) -> tuple[Array, Array, Array]:
+    """Leave nothing of the stiffness along motions that it holds by no more than differences err.
+
+    A joint whose gravity is compensated and that no task holds rests wherever it is. Its root is 0,
+    which rounding of the differences must not push to the left. H z = Sᵀ K (θ − S z) and
+    K (θ − S z) = C_z z + C_theta θ then hold exactly along it.
+
+    Returns:
+        H, C_z and C_theta.
+    """
+    k, springs = S.shape[1], np.diag(K)
+    settled = np.hstack([C_z, C_theta])
+    if len(memory.A):
+        settled = settled - memory.C @ np.linalg.solve(
+            memory.A, np.hstack([memory.B_z, memory.B_theta])
+        )
+    stretch = springs @ np.hstack([-S, np.eye(len(K))])
+    static = np.vstack([np.hstack([H, np.zeros_like(S.T)]) - S.T @ stretch, stretch - settled])
+    _, values, rows = np.linalg.svd(static)
+    loose = rows[values <= _KNOWN * (norm(H) + norm(settled))].T
+    left = static @ loose
+    command = left[k:] @ loose.T
+    z = np.linalg.pinv(loose[:k])
+    links = left[:k] @ z
+    links = links + links.T - z.T @ (loose[:k].T @ links)
+    return H - links, C_z + command[:, :k], C_theta + command[:, k:]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

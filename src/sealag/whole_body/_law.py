@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from itertools import groupby
 
-from sealag.errors import InputError
+from sealag.errors import InputError, word
 from sealag.robot import Robot, TermRows
 from sealag.typing import Array
 from sealag.whole_body._signals import MotorAngles, Signal
@@ -49,6 +49,8 @@ class Law:
         Raises:
             InputError: there is none, two have one name, or a word is not one of its kind.
         """
+        if isinstance(self.tasks, Task) or not all(isinstance(one, Task) for one in self.tasks):
+            raise InputError("The law's tasks are no tuple of Task; write tasks=(task,) for one.")
         object.__setattr__(self, "tasks", tuple(self.tasks))
         if not self.tasks:
             raise InputError("The law has no tasks; at least one is needed.")
@@ -61,7 +63,13 @@ class Law:
             ("task_inertia", TaskInertia),
             ("task_error", TaskError),
         ):
-            object.__setattr__(self, name, kind(getattr(self, name)))
+            found = word(kind, getattr(self, name), what=f"The law's {name}")
+            object.__setattr__(self, name, found)
+        if isinstance(self.signal, type) or not hasattr(self.signal, "motor_stiffness"):
+            raise InputError(
+                f"The law's signal is {self.signal!r}; MotorAngles(), LinkAngles(), StaticJoint() "
+                "or Tank() is right."
+            )
         ordered = tuple(sorted(self.tasks, key=lambda task: task.priority))
         object.__setattr__(self, "ordered", ordered)
 

@@ -50,15 +50,28 @@ class LinkPlant:
         self._robot, self._contacts, self._at = robot, contacts, robot.workspace()
 
     def jacobian(self, q: Array) -> Array:
-        """Return J_s (c, nv)."""
+        """Return J_s (c, nv).
+
+        Args:
+            q: (nq,) configuration.
+        """
         return self._robot.contact_jacobian(self._contacts, q)
 
     def places(self, q: Array) -> list[tuple[Array, Array]]:
-        """Return rotation (3, 3) and position (3,) of every contact."""
+        """Return rotation (3, 3) and position (3,) of every contact.
+
+        Args:
+            q: (nq,) configuration.
+        """
         return [self._robot.frame_placement(c.frame, q) for c in self._contacts]
 
     def displacement(self, q: Array, places: list[tuple[Array, Array]]) -> Array:
-        """Return how far the contacts are from given places (c,): m, then rotation vectors."""
+        """Return how far the contacts are from given places (c,): m, then rotation vectors.
+
+        Args:
+            q: (nq,) configuration.
+            places: as `places` returns them.
+        """
         parts = [np.zeros(0)]
         for contact, (R_0, p_0) in zip(self._contacts, places, strict=True):
             R, p = self._robot.frame_placement(contact.frame, q)
@@ -70,7 +83,12 @@ class LinkPlant:
 
     def support(self, q: Array, springs: Array | None = None) -> Array:
         """Return J_sᵀ λ (nv,), contact forces of least norm that carry what springs (n,) do not;
-        without springs, what they carry of the base alone."""
+        without springs, what they carry of the base alone.
+
+        Args:
+            q: (nq,) configuration.
+            springs: (n,) torque of the springs, Nm.
+        """
         return self.jacobian(q).T @ self._force(q, springs)
 
     def _force(self, q: Array, springs: Array | None) -> Array:
@@ -81,7 +99,13 @@ class LinkPlant:
         return np.linalg.lstsq(self.jacobian(q)[:, :rows].T, left[:rows], rcond=_LOST)[0]
 
     def stiffness(self, q: Array, springs: Array, directions: Array) -> Array:
-        """Return ∂(g − J_sᵀ λ)/∂q along directions (nv, p) at fixed forces λ, (nv, p)."""
+        """Return ∂(g − J_sᵀ λ)/∂q along directions at fixed forces λ, (nv, p).
+
+        Args:
+            q: (nq,) configuration.
+            springs: (n,) torque of the springs, Nm.
+            directions: (nv, p) tangent motions.
+        """
         force, rest = self._force(q, springs), np.zeros(self._robot.nv)
         out = np.empty((self._robot.nv, directions.shape[1]))
         for i, way in enumerate(directions.T):

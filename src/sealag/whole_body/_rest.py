@@ -11,7 +11,7 @@ from sealag.typing import Array
 from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._law import Law
 from sealag.whole_body._links import LinkPlant, null_space
-from sealag.whole_body._signals import SignalState
+from sealag.whole_body._signal_states import SignalState
 
 _BALANCED = 1e-10
 """Share of weight and torques that may be left over. Ten times smaller is rounding of the law; at
@@ -28,6 +28,7 @@ _PLACED = 1e-12  # m, rad: how far a contact may be from where the posture has i
 _ROUNDS = 60
 _LONGEST_STEP = 0.2  # rad: a longer Newton step leaves the region where its direction is good
 _HALVINGS = 12
+_PATIENCE = 12  # whole steps that need not bring the least residual yet
 _CUTOFF = 1e-10  # of the largest singular value: directions along which nothing acts (symmetries)
 
 
@@ -127,19 +128,34 @@ class _Search:
 
     def run(self) -> Rest:
         """Return the equilibrium, or the posture with why there is none."""
-        q, theta = self._posture, self._first(self._posture)
+        if self._robot.floating_base and not self._places:  # nothing holds the robot: it falls
+            return self._answer(self._posture, self._held(), self._why())
         try:
-            residual = self._residual(q, theta)
-            for _ in range(_ROUNDS):
-                if self._small(residual):
-                    return self._answer(q, theta, "")
-                step = self._newton(q, theta, residual)
-                q, theta, residual, better = self._search(q, theta, step, residual)
-                if not better:
-                    break
+            # Where contacts do not balance the posture, its margin is 0 wherever the loop rests.
+            for falling in (True, False) if self.posture().found else (True,):
+                found = self._follow(falling=falling)
+                if found is not None:
+                    return self._answer(*found, "")
         except ContractionError as error:
             return self._answer(self._posture, self._first(self._posture), str(error))
         return self._answer(self._posture, self._held(), self._why())
+
+    def _follow(self, *, falling: bool) -> tuple[Array, Array] | None:
+        """Newton's method from the posture, with steps that let the residual fall, or with whole
+        ones: a soft law sags past where the residual is larger."""
+        q, theta = self._posture, self._first(self._posture)
+        residual = self._residual(q, theta)
+        least, since = self._size(residual), 0
+        for _ in range(_ROUNDS):
+            if self._small(residual):
+                return q, theta
+            step = self._newton(q, theta, residual)
+            q, theta, residual, moved = self._search(q, theta, step, residual, falling=falling)
+            since = 0 if self._size(residual) < least else since + 1
+            least = min(least, self._size(residual))
+            if not moved or since > _PATIENCE:
+                return None
+        return None
 
     def posture(self) -> Rest:
         """Return the state in the posture."""
@@ -226,9 +242,15 @@ class _Search:
         return -np.linalg.lstsq(np.vstack(rows), right, rcond=_CUTOFF)[0]
 
     def _search(
-        self, q: Array, theta: Array, step: Array, residual: tuple[Array, Array, Array]
+        self,
+        q: Array,
+        theta: Array,
+        step: Array,
+        residual: tuple[Array, Array, Array],
+        *,
+        falling: bool,
     ) -> tuple[Array, Array, tuple[Array, Array, Array], bool]:
-        """Follow the step as far as the residual falls."""
+        """Follow the step as far as the residual falls, or as far as the law exists."""
         nv, before = self._robot.nv, self._size(residual)
         share = min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
         for _ in range(_HALVINGS):
@@ -238,7 +260,7 @@ class _Search:
                 new = self._residual(new_q, new_theta)
             except ContractionError:
                 new = None
-            if new is not None and (self._size(new) < before or self._small(new)):
+            if new is not None and (not falling or self._size(new) < before or self._small(new)):
                 return new_q, new_theta, new, True
             share /= 2.0
         return q, theta, residual, False
@@ -246,10 +268,15 @@ class _Search:
     def _why(self) -> str:
         left = self._robot.gravity(self._posture) - self._plant.support(self._posture)
         base = float(np.abs(left[: self._robot.nv_base]).max(initial=0.0))
+        if base > 1e-6 * self._scale and not len(self._places):
+            return (
+                "the base floats and nothing holds it: give contacts, or fix the base "
+                '(robot.base = "fixed")'
+            )
         if base > 1e-6 * self._scale:
             return (
-                f"contacts leave {base:.3g} N or Nm of gravity at the base that no contact force "
-                "balances, and no posture nearby is balanced"
+                f"no contact force balances {base:.3g} (N, Nm) of gravity at the base, and no "
+                "posture nearby is balanced"
             )
         return "no balance of springs, gravity and law was found near the posture"
 

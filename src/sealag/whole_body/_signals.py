@@ -5,22 +5,18 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from sealag.errors import InputError, UnknownNameError, either
+from sealag.errors import InputError, UnknownNameError, either, word
 from sealag.typing import Array, BoolArray
-from sealag.whole_body._protocol import Measurement
+from sealag.whole_body._signal_states import (
+    MeasuredAngles,
+    SignalState,
+    StaticState,
+    TankState,
+)
 from sealag.whole_body._tank import EnergyTank, TankFlow
-from sealag.whole_body._tasks import GravityCompensation
 
 if TYPE_CHECKING:
     from sealag.whole_body._evaluation import LawEvaluation
-
-_SETTLE = 60
-"""Newton iterations for q̄(θ) of a state that does not move; a handful is enough where it exists."""
-
-_STEP = 1e-5
-"""rad, m: half the base of central differences of the command. Ten times larger leaves 1e-8 of
-truncation, ten times smaller 1e-9 of rounding."""
-
 
 _ENDLESS = 1e-12
 """Determinant of I − K⁻¹ F_q from which a law is exactly as stiff as its springs."""
@@ -38,91 +34,6 @@ class Refusal(NamedTuple):
     reason: str
 
 
-class Present(NamedTuple):
-    """What the law would command without delay.
-
-    Attributes:
-        energy: potential of the tasks and what a tank holds, J.
-        joints: (n,) joint angles that gravity compensation is taken at, rad.
-    """
-
-    energy: float
-    joints: Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LawDerivative:
-    """The law about a state at rest, with memory ξ: ξ̇ = A ξ + B_q δq + B_theta δθ + B_rate δθ̇ and
-    δτ_osc = C ξ + C_q δq + C_theta δθ.
-
-    Attributes:
-        A: (s, s) 1/s; s = 0 for a law without memory.
-        B_q: (s, nv).
-        B_theta: (s, n).
-        B_rate: (s, n).
-        C: (n, s).
-        C_q: (n, nv) along tangent motions, Nm/rad.
-        C_theta: (n, n), Nm/rad.
-    """
-
-    A: Array
-    B_q: Array
-    B_theta: Array
-    B_rate: Array
-    C: Array
-    C_q: Array
-    C_theta: Array
-
-    @classmethod
-    def memoryless(cls, C_q: Array, C_theta: Array) -> "LawDerivative":
-        """Return the derivative of a law without memory.
-
-        Args:
-            C_q: (n, nv).
-            C_theta: (n, n).
-        """
-        n, nv = C_q.shape
-        none = np.zeros((0, n))
-        return cls(
-            A=np.zeros((0, 0)), B_q=np.zeros((0, nv)), B_theta=none, B_rate=none, C=none.T,
-            C_q=C_q, C_theta=C_theta,
-        )  # fmt: skip
-
-
-class SignalState(Protocol):
-    """A signal that runs: it moves the law from tick to tick."""
-
-    def reset(self, t: float, measurement: Measurement) -> None:
-        """Forget the past."""
-        ...
-
-    def command(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Write τ_osc (n,) of a measurement, and move the memory."""
-        ...
-
-    def present(self, measurement: Measurement, out: Array) -> Present:
-        """Write the command (n,) of the true state; the memory stays as it is."""
-        ...
-
-    def wound(self, carried: Array) -> Array:
-        """Return θ − q_j (n,) at which the tasks have no error, given the torque (n,) that springs
-        carry in the posture, Nm."""
-        ...
-
-    def settled(self, q: Array, theta: Array, out: Array) -> None:
-        """Write the command (n,) of a state that does not move, once it has settled."""
-        ...
-
-    def derivative(self, q: Array, theta: Array) -> LawDerivative:
-        """Return the derivative of what runs, about a state that does not move."""
-        ...
-
-    @property
-    def tank_energy(self) -> float:
-        """Energy in the tank, J; 0 without one."""
-        ...
-
-
 class Signal(Protocol):
     """The signal that a law is taken at."""
 
@@ -136,11 +47,20 @@ class Signal(Protocol):
 
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
         """Return −∂τ_osc/∂θ (…, n, n) of a law with joint stiffness F_q (…, n, n), springs K (n,);
-        NaN where the signal does not exist. For link angles it acts on them."""
+        NaN where the signal does not exist. For link angles it acts on them.
+
+        Args:
+            F_q: (…, n, n) joint stiffness of the law, Nm/rad.
+            K: (n,) springs, Nm/rad.
+        """
         ...
 
     def refusal(self, contraction: Array) -> Refusal | None:
-        """Return why no passive bound covers it, given the contraction factors (N,)."""
+        """Return why no passive bound covers it, given the contraction factors (N,).
+
+        Args:
+            contraction: (N,) contraction factors of q̄(θ).
+        """
         ...
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
@@ -153,66 +73,6 @@ class Signal(Protocol):
         ...
 
 
-class _Memoryless:
-    """A signal whose angles are measured: nothing is carried from tick to tick."""
-
-    tank_energy = 0.0
-
-    def __init__(self, law: "LawEvaluation", *, links: bool) -> None:
-        self._law, self._links = law, links
-        self._at = np.zeros(law.robot.n)
-
-    def _joints(self, q: Array, theta: Array) -> Array:
-        return self._law.robot.joint_positions(q) if self._links else theta
-
-    def reset(self, t: float, measurement: Measurement) -> None:
-        """Let the base follow as it does at the measurement."""
-        self._law.follow(measurement.q)
-
-    def command(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Write τ_osc."""
-        q = measurement.q
-        self._law.at(q, self._joints(q, measurement.theta), out)
-
-    def present(self, measurement: Measurement, out: Array) -> Present:
-        """Write the command of the true state."""
-        self.command(0.0, measurement, out)
-        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
-        return Present(energy, self._joints(measurement.q, measurement.theta))
-
-    def wound(self, carried: Array) -> Array:
-        """Return 0 for motor angles, what springs are wound by for link angles."""
-        return carried / self._law.spring_stiffness if self._links else np.zeros_like(carried)
-
-    def settled(self, q: Array, theta: Array, out: Array) -> None:
-        """Write the command of a state that does not move."""
-        law, joints = self._law, self._joints(q, theta)
-        away = joints - law.robot.joint_positions(q)
-        law.follow(q)
-        law.settled(lambda: law.at(q, joints, out), lambda: away)
-
-    def derivative(self, q: Array, theta: Array) -> LawDerivative:
-        """Differentiate the settled command."""
-        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta))
-
-
-def _differences(law: "LawEvaluation", function, q: Array, theta: Array, rows: int = 0):
-    """∂f/∂q (k, nv) and ∂f/∂θ (k, n) of function(q, θ, out), by central differences."""
-    robot = law.robot
-    k = rows or robot.n
-    ahead, behind = np.zeros(k), np.zeros(k)
-    by_q, by_theta = np.zeros((k, robot.nv)), np.zeros((k, robot.n))
-    for i, step in enumerate(_STEP * np.eye(robot.nv)):
-        function(robot.integrate(q, step), theta, ahead)
-        function(robot.integrate(q, -step), theta, behind)
-        by_q[:, i] = (ahead - behind) / (2.0 * _STEP)
-    for i, step in enumerate(_STEP * np.eye(robot.n)):
-        function(q, theta + step, ahead)
-        function(q, theta - step, behind)
-        by_theta[:, i] = (ahead - behind) / (2.0 * _STEP)
-    return by_q, by_theta
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorAngles:
     """x(θ): motor angles taken for joint angles. Collocated, −∂τ_osc/∂θ = F_q."""
@@ -222,15 +82,29 @@ class MotorAngles:
     rests_at_posture: ClassVar[bool] = False
 
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return F_q."""
+        """Return F_q.
+
+        Args:
+            F_q: (…, n, n) joint stiffness of the law, Nm/rad.
+            K: (n,) springs, Nm/rad.
+        """
         return F_q
 
     def refusal(self, contraction: Array) -> None:
-        """Return None."""
+        """Return None.
+
+        Args:
+            contraction: (N,) contraction factors of q̄(θ).
+        """
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
-        """Return the running signal."""
-        return _Memoryless(law, links=False)
+        """Return the running signal.
+
+        Args:
+            law: what evaluates the law.
+            delay_bound: bound d̄ of the delay that a tank pays for, s.
+        """
+        return MeasuredAngles(law, links=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -243,11 +117,20 @@ class LinkAngles:
     rests_at_posture: ClassVar[bool] = False
 
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return F_q, which acts on link angles."""
+        """Return F_q, which acts on link angles.
+
+        Args:
+            F_q: (…, n, n) joint stiffness of the law, Nm/rad.
+            K: (n,) springs, Nm/rad.
+        """
         return F_q
 
     def refusal(self, contraction: Array) -> Refusal:
-        """Return that it is not collocated."""
+        """Return that it is not collocated.
+
+        Args:
+            contraction: (N,) contraction factors of q̄(θ).
+        """
         return Refusal(
             np.ones(len(contraction), dtype=bool),
             "link angles are fed back, which is not collocated with the motors: no passivity "
@@ -255,51 +138,13 @@ class LinkAngles:
         )
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
-        """Return the running signal."""
-        return _Memoryless(law, links=True)
+        """Return the running signal.
 
-
-class _Static:
-    """q̄(θ), warm-started from tick to tick."""
-
-    tank_energy = 0.0
-
-    def __init__(self, law: "LawEvaluation", iterations: int) -> None:
-        self._law, self._iterations = law, iterations
-        self._sag = np.zeros(law.robot.n)
-
-    def reset(self, t: float, measurement: Measurement) -> None:
-        """Start q̄(θ) at the measured joint angles."""
-        self._sag[:] = measurement.q_joint - measurement.theta
-        self._law.follow(measurement.q)
-
-    def command(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Write τ_osc, with a few Newton steps from the last q̄."""
-        self._law.static(measurement.q, measurement.theta, self._sag, self._iterations, out)
-
-    def present(self, measurement: Measurement, out: Array) -> Present:
-        """Write the command at the settled q̄: V_3 at q̄ less ½ lᵀ K⁻¹ l."""
-        sag = self._sag.copy()
-        self._law.static(measurement.q, measurement.theta, sag, _SETTLE, out)
-        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
-        energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
-        return Present(energy, measurement.theta + sag)
-
-    def wound(self, carried: Array) -> Array:
-        """Return K⁻¹ ḡ of the compensation, at which q̄(θ) = q_j."""
-        none = self._law.law.gravity is GravityCompensation.NONE
-        return np.zeros_like(carried) if none else carried / self._law.spring_stiffness
-
-    def settled(self, q: Array, theta: Array, out: Array) -> None:
-        """Write the command at q̄ of a state that does not move."""
-        law, joints = self._law, self._law.robot.joint_positions(q)
-        sag = joints - theta
-        law.follow(q)
-        law.settled(lambda: law.static(q, theta, sag, _SETTLE, out), lambda: theta + sag - joints)
-
-    def derivative(self, q: Array, theta: Array) -> LawDerivative:
-        """Differentiate the settled command."""
-        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta))
+        Args:
+            law: what evaluates the law.
+            delay_bound: bound d̄ of the delay that a tank pays for, s.
+        """
+        return MeasuredAngles(law, links=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -325,7 +170,12 @@ class StaticJoint:
             raise InputError(f"iterations is {self.iterations}; 1 is the fewest.")
 
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return F_q (I − K⁻¹ F_q)⁻¹, the series of law and springs; NaN where it has no end."""
+        """Return F_q (I − K⁻¹ F_q)⁻¹, the series of law and springs; NaN where it has no end.
+
+        Args:
+            F_q: (…, n, n) joint stiffness of the law, Nm/rad.
+            K: (n,) springs, Nm/rad.
+        """
         F_theta = np.full_like(F_q, np.nan)
         loop = np.swapaxes(np.eye(len(K)) - F_q / K[:, None], -1, -2)
         ends = np.abs(np.linalg.det(loop)) > _ENDLESS
@@ -333,7 +183,11 @@ class StaticJoint:
         return np.swapaxes(F_theta, -1, -2)
 
     def refusal(self, contraction: Array) -> Refusal | None:
-        """Return where q̄(θ) is no contraction."""
+        """Return where q̄(θ) is no contraction.
+
+        Args:
+            contraction: (N,) contraction factors of q̄(θ).
+        """
         bad = ~(contraction < 1.0)
         if not bad.any():
             return None
@@ -344,8 +198,13 @@ class StaticJoint:
         )
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
-        """Return the running signal."""
-        return _Static(law, self.iterations)
+        """Return the running signal.
+
+        Args:
+            law: what evaluates the law.
+            delay_bound: bound d̄ of the delay that a tank pays for, s.
+        """
+        return StaticState(law, self.iterations)
 
 
 def static_contraction(F_q: Array, K: Array) -> Array:
@@ -357,109 +216,6 @@ def static_contraction(F_q: Array, K: Array) -> Array:
     """
     root = np.sqrt(K)
     return np.linalg.norm(F_q / root[:, None] / root, ord=2, axis=(-2, -1))
-
-
-class _Filled:
-    """The energy tank beside q̄(θ), which u moves x̂ to."""
-
-    def __init__(self, law: "LawEvaluation", tank: EnergyTank, iterations: int) -> None:
-        self._law, self._tank, self._static = law, tank, _Static(law, iterations)
-        n = law.robot.n
-        self._theta, self._last, self._unused = np.zeros(n), 0.0, np.zeros(n)
-
-    @property
-    def tank_energy(self) -> float:
-        """Energy left, J, never below 0."""
-        return self._tank.energy
-
-    def reset(self, t: float, measurement: Measurement) -> None:
-        """Fill the tank and forget x̂."""
-        self._tank.reset()
-        self._last = t
-        self._static.reset(t, measurement)
-
-    def command(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Write τ_osc at x̂, moved by the motors and, if the tank pays, to x(q̄(θ))."""
-        law, tank = self._law, self._tank
-        self._static.command(t, measurement, out)
-        target = law.wanted - law.error
-        self._matrices(measurement.q, measurement.theta)
-        if tank.started:
-            tank.step(
-                t - self._last,
-                law.space.J_star @ (measurement.theta - self._theta),
-                wanted=law.wanted,
-                target=target,
-                stiffness=law.space.stiffness,
-            )
-        else:
-            tank.start(target)
-        self._theta[:], self._last = measurement.theta, t
-        law.error[:] = law.wanted - tank.position
-        law.torque(out)
-
-    def _matrices(self, q: Array, theta: Array) -> None:
-        """Take compensation that is fed back at θ, whose gradient it has."""
-        if self._law.gravity_is_fed_back:
-            self._law.at(q, theta, self._unused)
-
-    def present(self, measurement: Measurement, out: Array) -> Present:
-        """Write the command with x̂ carried on by J* from the last measured θ to the true one."""
-        law, tank = self._law, self._tank
-        energy, _ = self._static.present(measurement, out)
-        self._matrices(measurement.q, measurement.theta)
-        if tank.started:
-            carried = law.space.J_star @ (measurement.theta - self._theta)
-            law.error[:] = law.wanted - tank.position - carried
-        law.torque(out)
-        energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy
-        return Present(energy, measurement.theta)
-
-    def wound(self, carried: Array) -> Array:
-        """Return that of q̄(θ)."""
-        return self._static.wound(carried)
-
-    def settled(self, q: Array, theta: Array, out: Array) -> None:
-        """Write the command once x̂ has come to x(q̄(θ))."""
-        target = np.zeros(self._law.rows)
-        self._target(q, theta, target)
-        self._at(q, theta, target, out)
-
-    def _target(self, q: Array, theta: Array, out: Array) -> None:
-        """x(q̄(θ)) (m,) of a state that does not move, relative to the posture's."""
-        self._static.settled(q, theta, self._unused)
-        out[:] = self._law.wanted - self._law.error
-
-    def _at(self, q: Array, theta: Array, position: Array, out: Array) -> None:
-        """The command (n,) of a state that does not move, with x̂ at a position (m,)."""
-        law, joints = self._law, self._law.robot.joint_positions(q)
-        self._static.settled(q, theta, out)
-        if law.gravity_is_fed_back:
-            law.follow(q)
-            law.settled(lambda: law.at(q, theta, out), lambda: theta - joints)
-        law.error[:] = law.wanted - position
-        law.torque(out)
-
-    def derivative(self, q: Array, theta: Array) -> LawDerivative:
-        """Return x̂̇ = J* θ̇ + rate (x(q̄) − x̂) while the tank can pay, and x̂ = J* θ while it cannot.
-
-        What the tank holds changes with the square of the motion, so that near a rest it pays for
-        all that u does as long as it holds anything.
-        """
-        law, m = self._law, self._law.rows
-        target, command = np.zeros(m), np.zeros(law.robot.n)
-        self._target(q, theta, target)
-        C_q, C_theta = _differences(law, lambda a, b, out: self._at(a, b, target, out), q, theta)
-        self._at(q, theta, target, command)
-        J, C = law.space.J_star.copy(), -law.space.J_star.T @ law.space.stiffness
-        if not self._tank.can_pay:
-            return LawDerivative.memoryless(C_q, C_theta + C @ J)
-        T_q, T_theta = _differences(law, self._target, q, theta, m)
-        rate = self._tank.rate
-        return LawDerivative(
-            A=-rate * np.eye(m), B_q=rate * T_q, B_theta=rate * T_theta, B_rate=J, C=C,
-            C_q=C_q, C_theta=C_theta,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -489,7 +245,7 @@ class Tank:
         Raises:
             InputError: energy or rate is negative or not finite, or there is no iteration.
         """
-        object.__setattr__(self, "flow", TankFlow(self.flow))
+        object.__setattr__(self, "flow", word(TankFlow, self.flow, what="The tank's flow"))
         for name in ("energy", "rate"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
@@ -498,11 +254,20 @@ class Tank:
             raise InputError(f"iterations is {self.iterations}; 1 is the fewest.")
 
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return F_q: what u does besides is paid for."""
+        """Return F_q: what u does besides is paid for.
+
+        Args:
+            F_q: (…, n, n) joint stiffness of the law, Nm/rad.
+            K: (n,) springs, Nm/rad.
+        """
         return F_q
 
     def refusal(self, contraction: Array) -> Refusal | None:
-        """Return that the published flow does not pay for all, or that q̄ does not exist."""
+        """Return that the published flow does not pay for all, or that q̄ does not exist.
+
+        Args:
+            contraction: (N,) contraction factors of q̄(θ).
+        """
         if self.flow is TankFlow.PUBLISHED:
             return Refusal(
                 np.ones(len(contraction), dtype=bool),
@@ -512,7 +277,12 @@ class Tank:
         return StaticJoint(iterations=self.iterations).refusal(contraction)
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
-        """Return the running signal."""
+        """Return the running signal.
+
+        Args:
+            law: what evaluates the law.
+            delay_bound: bound d̄ of the delay that a tank pays for, s.
+        """
         tank = EnergyTank(
             size=law.rows,
             energy=self.energy,
@@ -520,7 +290,7 @@ class Tank:
             delay_bound=delay_bound,
             flow=self.flow,
         )
-        return _Filled(law, tank, self.iterations)
+        return TankState(law, tank, self.iterations)
 
 
 _SIGNALS = (MotorAngles, LinkAngles, StaticJoint, Tank)

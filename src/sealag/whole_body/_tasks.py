@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from sealag.errors import InputError, either
+from sealag.errors import InputError, either, word
 from sealag.robot import Robot, TermRows
 from sealag.typing import Array, ArrayLike
 
@@ -120,7 +120,10 @@ class Task:
             InputError: the frame is missing, a key is given that tasks of this kind do not have,
                 axes do not exist, or an axis or joint is listed twice.
         """
-        object.__setattr__(self, "kind", TaskKind(self.kind))
+        kind = word(TaskKind, self.kind, what=f"The kind of task {self.name}")
+        object.__setattr__(self, "kind", kind)
+        if not (isinstance(self.priority, int) and all(isinstance(a, int) for a in self.axes)):
+            raise InputError(f"Task {self.name}: priority and axes are whole numbers.")
         if self.kind in _NEEDS_FRAME and not self.frame:
             raise InputError(f"Task {self.name}: its kind, {self.kind}, needs a frame.")
         for key, kinds in _ONLY.items():
@@ -185,6 +188,8 @@ def stiffness_matrix(values: ArrayLike, size: int, *, what: str) -> Array:
         InputError: it has another shape, is not finite, not symmetric or not positive
             semidefinite.
     """
+    if np.asarray(values).dtype.kind not in "fiu":
+        raise InputError(f"{what} is {values!r}; numbers are right.")
     array = np.asarray(values, dtype=float)
     if not np.isfinite(array).all():
         raise InputError(f"{what} has entries that are not finite numbers.")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from oracle.black_box.compare import compare, report
 from oracle.black_box.corpus import NIGHT, SUITE, random_design
+from oracle.black_box.motion import compare_motion, random_motion
 
 
 def main() -> int:
@@ -20,6 +21,7 @@ def main() -> int:
     )
     parser.add_argument("--folder", type=Path, default=None)
     parser.add_argument("--suite", action="store_true", help="small robots only, as in the suite")
+    parser.add_argument("--motions", action="store_true", help="motions of three instants")
     given = parser.parse_args()
     seed = given.seed if given.seed >= 0 else secrets.randbelow(10**9)
     folder = given.folder or Path(tempfile.mkdtemp(prefix="sealag_oracle_"))
@@ -28,7 +30,10 @@ def main() -> int:
     verdicts = []
     for k in range(given.count):
         path = random_design(seed + k, folder, SUITE if given.suite else NIGHT)
-        verdicts.append(compare(path))
+        if given.motions:
+            verdicts.append(compare_motion(path, random_motion(path, seed + k)))
+        else:
+            verdicts.append(compare(path))
         if verdicts[-1].kind in ("disagree", "fault"):
             print(f"{verdicts[-1].kind}: {path}: {verdicts[-1].said}", flush=True)
     print(report(verdicts))

@@ -43,8 +43,9 @@ class Body:
         self.T = self._coupling_matrix()
         self.damping = self.T.T @ np.diag(np.array(model.damping)) @ self.T
         self.falls_freely = design.floating and not design.contacts
-        if self.falls_freely:  # in the falling frame there is no gravity
-            model.gravity.linear = np.zeros(3)
+        self.weight = 9.81 * sum(one.mass for one in list(model.inertias)[1:])
+        at = [model.joints[model.getJointId(j)].idx_v for j in self.joints]
+        self.efforts = np.array(model.effortLimit)[at]
         self.contacts = [(self._frame(name), rows) for name, rows in design.contacts]
 
     def _frame(self, name: str) -> int:
@@ -153,8 +154,7 @@ class Body:
     def symmetries(self, q: np.ndarray) -> np.ndarray:
         """Return rigid motions (nv, s) that neither gravity nor a contact resists.
 
-        Translations and the turn about the vertical as far as contacts allow them; in free fall
-        every turn.
+        Translations and the turn about the vertical as far as contacts allow them.
         """
         if not self.base:
             return np.zeros((self.nv, 0))
@@ -164,8 +164,6 @@ class Body:
         for k, axis in enumerate(np.eye(3)):
             G[3:6, 3 + k] = R.T @ axis
             G[:3, 3 + k] = R.T @ np.cross(axis, q[:3])
-        if self.falls_freely:
-            return G
         G = G[:, [0, 1, 2, 5]]
         J, _ = self.held(q)
         _, values, rows = np.linalg.svd(J @ G, full_matrices=True)

@@ -49,17 +49,18 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scheme:
-    """What a random design is drawn from: shares of robots, and how often each oddity comes."""
+    """What a random design is drawn from: shares of robots, and most joints of an own one."""
 
-    own: float = 0.8
+    own: float = 0.9
     small: float = 0.1
-    arms: float = 0.07
-    legged: float = 0.03
+    arms: float = 0.0
+    legged: float = 0.0
     large: float = 0.0
+    most_joints: int = 2
 
 
 SUITE = Scheme()
-NIGHT = Scheme(own=0.45, small=0.1, arms=0.22, legged=0.18, large=0.05)
+NIGHT = Scheme(own=0.45, small=0.1, arms=0.22, legged=0.18, large=0.05, most_joints=4)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -112,7 +113,7 @@ def _robot(rng: np.random.Generator, seed: int, folder: Path, scheme: Scheme) ->
     if kind == 0:
         floating = bool(rng.random() < 0.5)
         name = f"robot_{seed}.urdf"
-        text = random_urdf(rng)
+        text = random_urdf(rng, scheme.most_joints)
         (folder / name).write_text(text)
     else:
         name = EXAMPLE + str(rng.choice((SMALL, ARMS, LEGGED, LARGE)[kind - 1]))
@@ -174,7 +175,7 @@ class _Writer:
             if low >= high:
                 value = 0.0
             if straight:
-                value = float(np.clip(self.log(1e-4, 1e-1), low, high))
+                value = float(np.clip(self.rng.choice([-1, 1]) * self.log(1e-6, 1e-1), low, high))
             self.position[name] = value
         self.contacts: list[tuple[str, str]] = []
         self.q = self._configuration(np.eye(3), np.zeros(3))
@@ -277,6 +278,7 @@ class _Writer:
         beta = self.log(0.2, 3.0) if self.chance(0.6) else 1.0
         sprung, viscous = self.chance(0.3), self.chance(0.15)
         zeta = self.log(0.1, 10.0)
+        rubbing, limited = self.chance(0.12), self.chance(0.15)
         parts = ["[actuators]"]
         for j in self.joints:
             K = self.inertia[j] * (self.spring_rate * self.log(0.4, 2.5)) ** 2
@@ -296,6 +298,10 @@ class _Writer:
                 lines.append(f"viscous_friction = {D * self.log(0.05, 0.5)!r}")
             if not ideal and self.chance(0.8):
                 lines.append(f"torque_bandwidth = {bandwidth * self.log(0.5, 2.0)!r}")
+            if rubbing:
+                lines.append(f"coulomb_friction = {self.load[j] * self.log(0.01, 0.5)!r}")
+            if limited:
+                lines.append(f"torque_limit = {max(self.load[j], 0.1) * self.log(0.7, 5.0)!r}")
             parts.append("\n".join(lines))
         return "\n".join(parts)
 
@@ -312,8 +318,9 @@ class _Writer:
         ]
         if self.feedback == "static_joint_tank":
             lines.append(f'tank_flow = "{choose(["corrected", "published"])}"')
-            lines.append(f"tank_rate = {self.log(0.5, 20.0)!r}")
-            lines.append(f"tank_energy_j = {self.log(0.5, 10.0)!r}")
+            rate, energy = self.log(0.5, 20.0), self.log(0.5, 10.0)
+            lines.append(f"tank_rate = {0.0 if self.chance(0.1) else rate!r}")
+            lines.append(f"tank_energy_j = {0.0 if self.chance(0.15) else energy!r}")
         return "\n".join(lines)
 
     def _task_sections(self) -> list[str]:

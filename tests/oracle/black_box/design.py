@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import sealag
 
 ACTUATOR_DEFAULTS = {
     "spring_damping": 0.0,
     "viscous_friction": 0.0,
     "torque_bandwidth": float("inf"),
-    "torque_limit": float("inf"),
 }
 
 
@@ -31,7 +32,9 @@ class Design:
         actuator_default: keys of [actuators.default].
         actuator_joint: keys of [actuators.joint.<name>].
         contacts: frame and number of held rows, 3 or 6.
-        tank: whether the law's memory has dynamics of its own.
+        feedback: what the law is taken at.
+        gravity: what it compensates, and where.
+        tank_pays: whether a tank, if there is one, holds energy and moves at a rate.
         torque_feedback_delay: e, s; 0 unless the design delays its inner torque feedback.
     """
 
@@ -45,7 +48,9 @@ class Design:
     actuator_default: dict[str, float]
     actuator_joint: dict[str, dict[str, float]]
     contacts: tuple[tuple[str, int], ...]
-    tank: bool
+    feedback: str
+    gravity: str
+    tank_pays: bool
     torque_feedback_delay: float
 
     def actuator(self, joint: str, key: str) -> float:
@@ -61,6 +66,47 @@ class Design:
         return float(self.actuator_default.get(key, ACTUATOR_DEFAULTS.get(key, float("nan"))))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """Springs, motors and torque loops, (n,) each, in the order of the joints."""
+
+    K: np.ndarray
+    B: np.ndarray
+    beta: np.ndarray
+    D: np.ndarray
+    D_s: np.ndarray
+    viscous: np.ndarray
+    bandwidth: np.ndarray
+    limit: np.ndarray
+
+    @classmethod
+    def of(cls, design: Design, joints: list[str], efforts: np.ndarray) -> "Drive":
+        """Return the drives of a design.
+
+        Args:
+            design: the project file.
+            joints: names, in order.
+            efforts: (n,) the URDF's limits, Nm, where the design gives none.
+        """
+        keys = {
+            "K": "spring_stiffness",
+            "B": "rotor_inertia",
+            "beta": "inertia_shaping",
+            "D": "motor_damping",
+            "D_s": "spring_damping",
+            "viscous": "viscous_friction",
+            "bandwidth": "torque_bandwidth",
+            "limit": "torque_limit",
+        }
+        drives = {
+            name: np.array([design.actuator(joint, key) for joint in joints])
+            for name, key in keys.items()
+        }
+        unlimited = np.isnan(drives["limit"])
+        drives["limit"] = np.where(unlimited, efforts, drives["limit"])
+        return cls(**drives)
+
+
 def read_design(path: str | Path) -> Design:
     """Read the physical part of a project file.
 
@@ -69,7 +115,7 @@ def read_design(path: str | Path) -> Design:
     """
     path = Path(path)
     data = tomllib.loads(path.read_text())
-    robot, posture = data["robot"], data.get("posture", {})
+    robot, posture, law = data["robot"], data.get("posture", {}), data["controller"]
     actuators, delays = data["actuators"], data["delays"]
     rows = {"point": 3, "surface": 6}
     late = delays.get("delayed_torque_feedback", False)
@@ -86,7 +132,9 @@ def read_design(path: str | Path) -> Design:
         contacts=tuple(
             (c["frame"], rows[c.get("kind", "point")]) for c in data.get("contacts", [])
         ),
-        tank=data["controller"]["feedback"] == "static_joint_tank",
+        feedback=law["feedback"],
+        gravity=law["gravity"],
+        tank_pays=all(law.get(key, 1.0) > 0.0 for key in ("tank_energy_j", "tank_rate")),
         torque_feedback_delay=_embedded_up(delays) if late else 0.0,
     )
 

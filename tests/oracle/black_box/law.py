@@ -20,6 +20,8 @@ ROUNDING = 1e-8
 STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
 """rad, m: largest steps of the difference quotients, tried until they agree to SMOOTH."""
 SMOOTH = 1e-9
+CORNERED = 1e-4
+"""Share of a derivative by which a slope in a general direction may miss what the columns say."""
 
 
 class Unsettled(RuntimeError):
@@ -124,27 +126,30 @@ class TankLaw(Law):
         """Return the command once x̂ has arrived, with ticks of 10 s."""
         return super().settled(q, theta, period=10.0 if period == PERIOD else period)
 
+    def slope(self, q: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """Return ∂τ_osc/∂(v, θ) while x̂ moves with θ alone, (n, nv + n)."""
+
+        def at_once(step: np.ndarray) -> np.ndarray:
+            return self._after(q, theta, step, period=0.0)
+
+        return derivative(at_once, self._body.nv + self._body.n)
+
     def slopes(self, q: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Return ∂τ_osc/∂(v, θ) at once and once x̂ has followed, (n, nv + n), and its rate, 1/s."""
 
-        def shifted(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return self._body.move(q, step[: self._body.nv]), theta + step[self._body.nv :]
-
-        def fresh() -> None:
-            self.reset(q, theta)
-            self.settled(q, theta)
-
-        def at_once(step: np.ndarray) -> np.ndarray:
-            fresh()
-            return self.settled(*shifted(step), period=0.0)
-
         def later(step: np.ndarray) -> np.ndarray:
-            fresh()
-            return self.settled(*shifted(step))
+            return self._after(q, theta, step, period=PERIOD)
 
-        size = self._body.nv + self._body.n
-        fast, slow = derivative(at_once, size), derivative(later, size)
+        fast = self.slope(q, theta)
+        slow = derivative(later, self._body.nv + self._body.n)
         return fast, slow, self._measured_rate(q, theta, fast - slow)
+
+    def _after(self, q, theta, step: np.ndarray, *, period: float) -> np.ndarray:
+        """Command (n,) after a settled start and a step."""
+        self.reset(q, theta)
+        self.settled(q, theta)
+        there = self._body.move(q, step[: self._body.nv]), theta + step[self._body.nv :]
+        return self.settled(*there, period=period)
 
     def _measured_rate(self, q: np.ndarray, theta: np.ndarray, gap: np.ndarray) -> float:
         """1/s, from one short tick along the direction in which x̂ has most to follow."""
@@ -171,7 +176,7 @@ def derivative(f: Callable[[np.ndarray], np.ndarray], size: int) -> np.ndarray:
         size: how many columns.
 
     Raises:
-        Unsettled: difference quotients of no step width agree.
+        Unsettled: difference quotients of no step width agree, or f has a corner.
     """
     best, closest, lost = None, np.inf, None
     for width in STEPS:
@@ -189,7 +194,17 @@ def derivative(f: Callable[[np.ndarray], np.ndarray], size: int) -> np.ndarray:
         raise lost
     if best is None or closest > 1e-5:
         raise Unsettled(f"difference quotients disagree by {closest:.1g} of the derivative")
+    _require_linear(f, best, width)
     return best
+
+
+def _require_linear(f: Callable, D: np.ndarray, width: float) -> None:
+    """Refuse a corner: where slopes do not add up, difference quotients are no derivative."""
+    way = np.cos(1.0 + 2.0 * np.arange(D.shape[1]))
+    slope = (f(width / 4.0 * way) - f(-width / 4.0 * way)) / (width / 2.0)
+    off = float(np.abs(slope - D @ way).max(initial=0.0))
+    if off > max(CORNERED * float(np.abs(D).max(initial=0.0)), 1e-6):
+        raise Unsettled(f"slopes do not add up: {off:.2g} of {np.abs(D).max():.2g} is left over")
 
 
 def _extrapolated(f: Callable, size: int, width: float) -> tuple[np.ndarray, float]:

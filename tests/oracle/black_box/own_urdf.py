@@ -3,19 +3,20 @@
 import numpy as np
 
 
-def random_urdf(rng: np.random.Generator) -> str:
+def random_urdf(rng: np.random.Generator, most: int = 4) -> str:
     """Return the text of a random URDF.
 
     Args:
         rng: decides everything.
+        most: joints.
     """
-    count = int(rng.integers(1, 5))
-    damped, mimic = rng.random() < 0.35, rng.random() < 0.15 and count > 1
+    count = int(rng.integers(1, most + 1))
+    damped, mimic = rng.random() < 0.35, rng.random() < 0.2 and count > 1
     limited = rng.random() < 0.5
     parts = ['<robot name="own">', _link("base", rng)]
     for k in range(count):
         parent = "base" if k == 0 else f"link{int(rng.integers(max(0, k - 2), k))}"
-        sliding = rng.random() < 0.15
+        sliding = rng.random() < 0.2
         parts.append(_link(f"link{k}", rng))
         more = ""
         if damped:

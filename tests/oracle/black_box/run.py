@@ -8,7 +8,7 @@ from collections import deque
 
 import numpy as np
 
-from oracle.black_box.loop import BlackBox
+from oracle.black_box.box import BlackBox
 
 AMPLITUDE = 1e-6
 """rad, m: of the push that starts the motion; velocities are too small for Coriolis forces."""

@@ -4,8 +4,9 @@ import re
 from pathlib import Path
 
 import sealag
+from oracle.black_box.box import BlackBox
 from oracle.black_box.law import Unsettled
-from oracle.black_box.loop import BlackBox, NoEquilibrium
+from oracle.black_box.rest import NoEquilibrium
 from oracle.black_box.roots import roots, unstable_count
 
 BISECTIONS = 12

@@ -1,0 +1,345 @@
+"""Signals that run: what moves the law from tick to tick, and how it answers to small motions."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from sealag.typing import Array
+from sealag.whole_body._protocol import Measurement
+from sealag.whole_body._tank import EnergyTank
+from sealag.whole_body._tasks import GravityCompensation
+
+if TYPE_CHECKING:
+    from sealag.whole_body._evaluation import LawEvaluation
+
+_SETTLE = 60
+"""Newton iterations for q̄(θ) of a state that does not move; a handful is enough where it exists."""
+
+_STEP = 2e-5
+"""rad, m: half the base of central differences of the command, extrapolated with those of half the
+base. Near singular postures, where the law bends within 1e-3 rad, plain differences of 1e-5 rad
+leave 1e-5 of the derivative; these leave 5e-9, of which half is rounding."""
+
+
+class Present(NamedTuple):
+    """What the law would command without delay.
+
+    Attributes:
+        energy: potential of the tasks and what a tank holds, J.
+        joints: (n,) joint angles that gravity compensation is taken at, rad.
+    """
+
+    energy: float
+    joints: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawDerivative:
+    """The law about a state at rest, with memory ξ: ξ̇ = A ξ + B_q δq + B_theta δθ + B_rate δθ̇ and
+    δτ_osc = C ξ + C_q δq + C_theta δθ.
+
+    Attributes:
+        A: (s, s) 1/s; s = 0 for a law without memory.
+        B_q: (s, nv).
+        B_theta: (s, n).
+        B_rate: (s, n).
+        C: (n, s).
+        C_q: (n, nv) along tangent motions, Nm/rad.
+        C_theta: (n, n), Nm/rad.
+    """
+
+    A: Array
+    B_q: Array
+    B_theta: Array
+    B_rate: Array
+    C: Array
+    C_q: Array
+    C_theta: Array
+
+    @classmethod
+    def memoryless(cls, C_q: Array, C_theta: Array) -> "LawDerivative":
+        """Return the derivative of a law without memory.
+
+        Args:
+            C_q: (n, nv).
+            C_theta: (n, n).
+        """
+        n, nv = C_q.shape
+        none = np.zeros((0, n))
+        return cls(
+            A=np.zeros((0, 0)), B_q=np.zeros((0, nv)), B_theta=none, B_rate=none, C=none.T,
+            C_q=C_q, C_theta=C_theta,
+        )  # fmt: skip
+
+
+class SignalState(Protocol):
+    """A signal that runs: it moves the law from tick to tick."""
+
+    def reset(self, t: float, measurement: Measurement) -> None:
+        """Forget the past.
+
+        Args:
+            t: first instant, s.
+            measurement: the state then.
+        """
+        ...
+
+    def command(self, t: float, measurement: Measurement, out: Array) -> None:
+        """Write τ_osc of a measurement, and move the memory.
+
+        Args:
+            t: the controller's clock, s.
+            measurement: the newest measurement.
+            out: (n,) command, Nm, written.
+        """
+        ...
+
+    def present(self, measurement: Measurement, out: Array) -> Present:
+        """Write the command of the true state; the memory stays as it is.
+
+        Args:
+            measurement: the true state.
+            out: (n,) command, Nm, written.
+        """
+        ...
+
+    def wound(self, carried: Array) -> Array:
+        """Return θ − q_j (n,) at which the tasks have no error.
+
+        Args:
+            carried: (n,) torque that springs carry in the posture, Nm.
+        """
+        ...
+
+    def settled(self, q: Array, theta: Array, out: Array) -> None:
+        """Write the command of a state that does not move, once it has settled.
+
+        Args:
+            q: (nq,) configuration.
+            theta: (n,) motor angles, rad.
+            out: (n,) command, Nm, written.
+        """
+        ...
+
+    def derivative(self, q: Array, theta: Array) -> LawDerivative:
+        """Return the derivative of what runs, about a state that does not move.
+
+        Args:
+            q: (nq,) configuration.
+            theta: (n,) motor angles, rad.
+        """
+        ...
+
+    @property
+    def tank_energy(self) -> float:
+        """Energy in the tank, J; 0 without one."""
+        ...
+
+
+class MeasuredAngles:
+    """A signal whose angles are measured: nothing is carried from tick to tick."""
+
+    tank_energy = 0.0
+
+    def __init__(self, law: "LawEvaluation", *, links: bool) -> None:
+        self._law, self._links = law, links
+        self._at = np.zeros(law.robot.n)
+
+    def _joints(self, q: Array, theta: Array) -> Array:
+        return self._law.robot.joint_positions(q) if self._links else theta
+
+    def reset(self, t: float, measurement: Measurement) -> None:
+        """Let the base follow as it does at the measurement."""
+        self._law.follow(measurement.q)
+
+    def command(self, t: float, measurement: Measurement, out: Array) -> None:
+        """Write τ_osc."""
+        q = measurement.q
+        self._law.at(q, self._joints(q, measurement.theta), out)
+
+    def present(self, measurement: Measurement, out: Array) -> Present:
+        """Write the command of the true state."""
+        self.command(0.0, measurement, out)
+        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
+        return Present(energy, self._joints(measurement.q, measurement.theta))
+
+    def wound(self, carried: Array) -> Array:
+        """Return 0 for motor angles, what springs are wound by for link angles."""
+        return carried / self._law.spring_stiffness if self._links else np.zeros_like(carried)
+
+    def settled(self, q: Array, theta: Array, out: Array) -> None:
+        """Write the command of a state that does not move."""
+        law, joints = self._law, self._joints(q, theta)
+        away = joints - law.robot.joint_positions(q)
+        law.follow(q)
+        law.settled(lambda: law.at(q, joints, out), lambda: away)
+
+    def derivative(self, q: Array, theta: Array) -> LawDerivative:
+        """Differentiate the settled command."""
+        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta))
+
+
+def _differences(law: "LawEvaluation", function, q: Array, theta: Array, rows: int = 0):
+    """∂f/∂q (k, nv) and ∂f/∂θ (k, n) of function(q, θ, out), by central differences extrapolated to
+    none: (4 D(h/2) − D(h)) / 3."""
+    robot = law.robot
+    k = rows or robot.n
+    ahead, behind = np.zeros(k), np.zeros(k)
+    by_q, by_theta = np.zeros((k, robot.nv)), np.zeros((k, robot.n))
+    for width, share in ((_STEP / 2.0, 4.0 / 3.0), (_STEP, -1.0 / 3.0)):
+        for i, step in enumerate(width * np.eye(robot.nv)):
+            function(robot.integrate(q, step), theta, ahead)
+            function(robot.integrate(q, -step), theta, behind)
+            by_q[:, i] += share * (ahead - behind) / (2.0 * width)
+        for i, step in enumerate(width * np.eye(robot.n)):
+            function(q, theta + step, ahead)
+            function(q, theta - step, behind)
+            by_theta[:, i] += share * (ahead - behind) / (2.0 * width)
+    return by_q, by_theta
+
+
+class StaticState:
+    """q̄(θ), warm-started from tick to tick."""
+
+    tank_energy = 0.0
+
+    def __init__(self, law: "LawEvaluation", iterations: int) -> None:
+        self._law, self._iterations = law, iterations
+        self._sag = np.zeros(law.robot.n)
+
+    def reset(self, t: float, measurement: Measurement) -> None:
+        """Start q̄(θ) at the measured joint angles."""
+        self._sag[:] = measurement.q_joint - measurement.theta
+        self._law.follow(measurement.q)
+
+    def command(self, t: float, measurement: Measurement, out: Array) -> None:
+        """Write τ_osc, with a few Newton steps from the last q̄."""
+        self._law.static(measurement.q, measurement.theta, self._sag, self._iterations, out)
+
+    def present(self, measurement: Measurement, out: Array) -> Present:
+        """Write the command at the settled q̄: V_3 at q̄ less ½ lᵀ K⁻¹ l."""
+        sag = self._sag.copy()
+        self._law.static(measurement.q, measurement.theta, sag, _SETTLE, out)
+        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
+        energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
+        return Present(energy, measurement.theta + sag)
+
+    def wound(self, carried: Array) -> Array:
+        """Return K⁻¹ ḡ of the compensation, at which q̄(θ) = q_j."""
+        none = self._law.law.gravity is GravityCompensation.NONE
+        return np.zeros_like(carried) if none else carried / self._law.spring_stiffness
+
+    def settled(self, q: Array, theta: Array, out: Array) -> None:
+        """Write the command at q̄ of a state that does not move."""
+        law, joints = self._law, self._law.robot.joint_positions(q)
+        sag = joints - theta
+        law.follow(q)
+        law.settled(lambda: law.static(q, theta, sag, _SETTLE, out), lambda: theta + sag - joints)
+
+    def derivative(self, q: Array, theta: Array) -> LawDerivative:
+        """Differentiate the settled command."""
+        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta))
+
+
+class TankState:
+    """The energy tank beside q̄(θ), which u moves x̂ to."""
+
+    def __init__(self, law: "LawEvaluation", tank: EnergyTank, iterations: int) -> None:
+        self._law, self._tank, self._static = law, tank, StaticState(law, iterations)
+        n = law.robot.n
+        self._theta, self._last, self._unused = np.zeros(n), 0.0, np.zeros(n)
+
+    @property
+    def tank_energy(self) -> float:
+        """Energy left, J, never below 0."""
+        return self._tank.energy
+
+    def reset(self, t: float, measurement: Measurement) -> None:
+        """Fill the tank and forget x̂."""
+        self._tank.reset()
+        self._last = t
+        self._static.reset(t, measurement)
+
+    def command(self, t: float, measurement: Measurement, out: Array) -> None:
+        """Write τ_osc at x̂, moved by the motors and, if the tank pays, to x(q̄(θ))."""
+        law, tank = self._law, self._tank
+        self._static.command(t, measurement, out)
+        target = law.wanted - law.error
+        self._matrices(measurement.q, measurement.theta)
+        if tank.started:
+            tank.step(
+                t - self._last,
+                law.space.J_star @ (measurement.theta - self._theta),
+                wanted=law.wanted,
+                target=target,
+                stiffness=law.space.stiffness,
+            )
+        else:
+            tank.start(target)
+        self._theta[:], self._last = measurement.theta, t
+        law.error[:] = law.wanted - tank.position
+        law.torque(out)
+
+    def _matrices(self, q: Array, theta: Array) -> None:
+        """Take compensation that is fed back at θ, whose gradient it has."""
+        if self._law.gravity_is_fed_back:
+            self._law.at(q, theta, self._unused)
+
+    def present(self, measurement: Measurement, out: Array) -> Present:
+        """Write the command with x̂ carried on by J* from the last measured θ to the true one."""
+        law, tank = self._law, self._tank
+        energy, _ = self._static.present(measurement, out)
+        self._matrices(measurement.q, measurement.theta)
+        if tank.started:
+            carried = law.space.J_star @ (measurement.theta - self._theta)
+            law.error[:] = law.wanted - tank.position - carried
+        law.torque(out)
+        energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy
+        return Present(energy, measurement.theta)
+
+    def wound(self, carried: Array) -> Array:
+        """Return that of q̄(θ)."""
+        return self._static.wound(carried)
+
+    def settled(self, q: Array, theta: Array, out: Array) -> None:
+        """Write the command once x̂ has come to x(q̄(θ))."""
+        target = np.zeros(self._law.rows)
+        self._target(q, theta, target)
+        self._at(q, theta, target, out)
+
+    def _target(self, q: Array, theta: Array, out: Array) -> None:
+        """x(q̄(θ)) (m,) of a state that does not move, relative to the posture's."""
+        self._static.settled(q, theta, self._unused)
+        out[:] = self._law.wanted - self._law.error
+
+    def _at(self, q: Array, theta: Array, position: Array, out: Array) -> None:
+        """The command (n,) of a state that does not move, with x̂ at a position (m,)."""
+        law, joints = self._law, self._law.robot.joint_positions(q)
+        self._static.settled(q, theta, out)
+        if law.gravity_is_fed_back:
+            law.follow(q)
+            law.settled(lambda: law.at(q, theta, out), lambda: theta - joints)
+        law.error[:] = law.wanted - position
+        law.torque(out)
+
+    def derivative(self, q: Array, theta: Array) -> LawDerivative:
+        """Return x̂̇ = J* θ̇ + rate (x(q̄) − x̂) while the tank can pay, and x̂ = J* θ while it cannot.
+
+        What the tank holds changes with the square of the motion, so that near a rest it pays for
+        all that u does as long as it holds anything.
+        """
+        law, m = self._law, self._law.rows
+        target, command = np.zeros(m), np.zeros(law.robot.n)
+        self._target(q, theta, target)
+        C_q, C_theta = _differences(law, lambda a, b, out: self._at(a, b, target, out), q, theta)
+        self._at(q, theta, target, command)
+        J, C = law.space.J_star.copy(), -law.space.J_star.T @ law.space.stiffness
+        if not self._tank.can_pay:
+            return LawDerivative.memoryless(C_q, C_theta + C @ J)
+        T_q, T_theta = _differences(law, self._target, q, theta, m)
+        rate = self._tank.rate
+        return LawDerivative(
+            A=-rate * np.eye(m), B_q=rate * T_q, B_theta=rate * T_theta, B_rate=J, C=C,
+            C_q=C_q, C_theta=C_theta,
+        )  # fmt: skip
