@@ -110,13 +110,13 @@ def test_slow_root_beside_fast_ones_is_refined(seed: int, slow: float) -> None:
         np.diag([-slow, -30.0, -100.0, -300.0, -1000.0, -2000.0]),
         np.diag([-1.5 * slow, 1.0, 2.0, -3.0, 4.0, -5.0]),
     )
-    mixed = tuple(np.linalg.solve(T, A @ T) for A in loop)
-    answer = delay_margin(*mixed)
+    A_0, A_1 = (np.linalg.solve(T, A @ T) for A in loop)
+    answer = delay_margin(A_0, A_1)
     assert answer.guaranteed
     assert len(answer.crossings) == 1
     omega = slow * math.sqrt(1.25)
     assert answer.delay == pytest.approx(math.acos(-1.0 / 1.5) / omega, rel=1e-4)
-    assert _off(*mixed, answer.delay, answer.frequency) < 1e-6
+    assert _off(A_0, A_1, answer.delay, answer.frequency) < 1e-6
 
 
 @pytest.mark.parametrize(("seed", "count"), [(406, 3), (927, 4), (937, 4)])

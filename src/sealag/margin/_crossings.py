@@ -128,7 +128,8 @@ def _in_passage(picture: Picture, part: Passage, curve: Curve) -> Found:
     start = min(max(start, part.lower), part.upper)
     expected = value + (start - family.centre) * family.motion[k, k]
     phi, omega = picture.place(start, complex(1j * expected.imag))
-    point = _newton(picture.loop, phi, omega, left=family.left[k], right=family.right[:, k])
+    vectors = {"left": family.left[k], "right": family.right[:, k]}
+    point = _newton(picture.loop, phi, omega, **vectors, proven=signs[0] * signs[1] < 0.0)
     if point is not None and _belongs(picture, part, curve, point):
         return _reported(picture.loop, point, touching=False)
     return Found([], explained=False, decided=False)
@@ -298,8 +299,13 @@ def _border(
     return _Border(wide[n], blur, by_root, by_turn, v, slope=-by_turn / by_root)
 
 
-def _newton(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) -> _Point | None:
-    """Newton's method on g(jω, φ) = 0 in the real unknowns φ and ω, until rounding stops it."""
+def _newton(
+    loop: Loop, phi: float, omega: float, *, left: Array, right: Array, proven: bool = False
+) -> _Point | None:
+    """Newton's method on g(jω, φ) = 0 in the real unknowns φ and ω, until rounding stops it.
+
+    Only where a crossing is proven may rounding stop it early: a band may hold none.
+    """
     best: tuple[float, float, float, _Border] | None = None
     allowed = _CONVERGED
     turn, height = np.longdouble(phi), np.longdouble(omega)
@@ -316,8 +322,9 @@ def _newton(loop: Loop, phi: float, omega: float, *, left: Array, right: Array) 
             if best is not None and not moved < best[0]:
                 break
             best = moved, float(turn), float(height), border
-            rates = max(abs(border.by_root), abs(border.by_turn) / loop.size)
-            allowed = max(_CONVERGED, 4.0 * border.blur * rates / abs(area))
+            if proven:
+                rates = max(abs(border.by_root), abs(border.by_turn) / loop.size)
+                allowed = max(_CONVERGED, 4.0 * border.blur * rates / abs(area))
             turn, height = turn + step_phi, height + step_omega
             if moved <= 1e-16:
                 break
