@@ -14,7 +14,11 @@ CASE = WalkCase(steps=7, physics=1.25e-4, embedded=1e-3)
 
 @pytest.fixture(scope="module")
 def hume():
-    return load("bundled:hume")
+    """Hume without the limits of its motors, which the MuJoCo model has not."""
+    system = load("bundled:hume")
+    none = np.full(system.robot.n, np.inf)
+    free = replace(system.actuators, torque_limit=none, velocity_limit=none)
+    return replace(system, actuators=free)
 
 
 @pytest.fixture(scope="module")

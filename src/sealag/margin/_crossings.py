@@ -83,8 +83,9 @@ def crossings_of(picture: Picture, passages: list[Passage], bands: list[Band]) -
     Returns:
         The crossings by delay, each once, and what is left open.
     """
-    parts = [_in_passage(picture, one, curve) for one in passages for curve in one.curves]
-    single = _once([item for part in parts for item in part.crossings])
+    inside = [[_in_passage(picture, one, curve) for curve in one.curves] for one in passages]
+    parts = [part for curves in inside for part in curves]
+    single = _once([[item for part in curves for item in part.crossings] for curves in inside])
     for band in bands:
         part = _in_band(picture, band)
         parts.append(part)
@@ -96,12 +97,18 @@ def crossings_of(picture: Picture, passages: list[Passage], bands: list[Band]) -
     )
 
 
-def _once(crossings: list[Crossing]) -> list[Crossing]:
-    """Leave out what two parts found at the end that they share."""
+def _once(passages: list[list[Crossing]]) -> list[Crossing]:
+    """Leave out what two passages found at the end that they share.
+
+    Curves of one passage that cross at one place are different roots: two equal arms have two.
+    """
     kept: list[Crossing] = []
-    for one in crossings:
-        if not any(_same(one, two) for two in kept):
-            kept.append(one)
+    for found in passages:
+        before = list(kept)
+        for i, one in enumerate(found, start=1):
+            here = sum(_same(one, two) for two in found[:i])
+            if here > sum(_same(one, two) for two in before):
+                kept.append(one)
     return kept
 
 
