@@ -1,10 +1,10 @@
 """A system built in Python, without a file: what it answers, and what it refuses to be."""
 
-from dataclasses import hashlib
+import hashlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
-import replace
 
 import sealag
 from helpers.small_systems import arm, arm_system, constant_delays, joint_task
