@@ -90,14 +90,8 @@ def _recomputed(data: dict[str, Any], system: System, motion: Motion | None) -> 
     if data["time_s"] != fresh["time_s"]:
         return
     spaces = system.spaces(motion)
-    motion = system.still() if motion is None else motion
-    rest = system.rest(motion) if len(motion) == 1 else None
-    kind = Criterion(data["criterion"])
-    bounds = (
-        published_bounds(spaces, system)
-        if kind is Criterion.PUBLISHED
-        else certified_bounds(spaces, system, rest, motion)
-    )
+    printed = Criterion(data["criterion"]) is Criterion.PUBLISHED
+    bounds = (published_bounds if printed else certified_bounds)(spaces, system)
     held = {proof["instant"]: proof for proof in fresh["proofs"]}
     for proof in data["proofs"]:
         yield _matrices(proof, held.get(proof["instant"]), bounds.F[proof["instant"]])
