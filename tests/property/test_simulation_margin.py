@@ -111,7 +111,7 @@ def _with(system, pushes):
 def test_margin_parts_convergence_from_divergence_on_whole_robots(name, frame, force):
     """Baxter's 14 joints, and ANYmal on its four feet, swaying sideways."""
     system = load(EXAMPLES / f"{name}.toml")
-    frozen = system.frozen(system.still(), system.evaluate(system.still()), 0)
+    frozen = system.frozen()
     margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries).delay
     assert 0.0 < margin < np.inf
     assert _robot_growth(system, 0.95 * margin, frame=frame, force=force) < 1
