@@ -5,7 +5,7 @@ from sealag.actuation._actuators import (
     actuators,
     actuators_of,
     joint_values,
-    motor_parameters,
+    motors_of,
 )
 from sealag.actuation._transparency import (
     Transparency,
@@ -21,7 +21,7 @@ __all__ = [
     "actuators_of",
     "deviation_rms",
     "joint_values",
-    "motor_parameters",
+    "motors_of",
     "torque_transfer",
     "transparency",
 ]

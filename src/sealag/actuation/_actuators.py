@@ -2,12 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sealag.errors import InputError
 from sealag.robot import Robot
 from sealag.typing import Array, ArrayLike
+
+if TYPE_CHECKING:
+    from sealag.kernels.motor import Motors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,24 +172,28 @@ def joint_values(
     return np.array(array)
 
 
-def motor_parameters(actuators: Actuators, joint_damping: ArrayLike = 0.0) -> Array:
-    """Return the joints as the motor kernels take them, (n, 11).
+def motors_of(actuators: Actuators, joint_damping: ArrayLike = 0.0) -> "Motors":
+    """Return springs, motors and drives as the motor kernels take them.
 
     Args:
         actuators: springs, motors and drives.
         joint_damping: (n,) or one number, of the links' side, Nms/rad.
     """
-    columns = [
-        actuators.spring_stiffness,
-        actuators.spring_damping,
-        actuators.rotor_inertia,
-        actuators.rotor_inertia / actuators.shaped_inertia,
-        actuators.motor_damping,
-        actuators.viscous_friction,
-        actuators.coulomb_friction,
-        actuators.torque_limit,
-        actuators.velocity_limit,
-        actuators.torque_bandwidth,
-        np.broadcast_to(joint_damping, actuators.n),
-    ]
-    return np.ascontiguousarray(np.stack(columns, axis=1), dtype=float)
+    from sealag.kernels.motor import Motors
+
+    def own(values: ArrayLike) -> Array:
+        return np.ascontiguousarray(np.broadcast_to(values, actuators.n), dtype=float).copy()
+
+    return Motors(
+        stiffness=own(actuators.spring_stiffness),
+        spring_damping=own(actuators.spring_damping),
+        inertia=own(actuators.rotor_inertia),
+        ratio=own(actuators.rotor_inertia / actuators.shaped_inertia),
+        damping=own(actuators.motor_damping),
+        viscous=own(actuators.viscous_friction),
+        coulomb=own(actuators.coulomb_friction),
+        torque_limit=own(actuators.torque_limit),
+        velocity_limit=own(actuators.velocity_limit),
+        bandwidth=own(actuators.torque_bandwidth),
+        bearing=own(joint_damping),
+    )

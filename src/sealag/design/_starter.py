@@ -114,7 +114,7 @@ def _feet(robot: Robot) -> list[str]:
     words = ("foot", "sole", "toe")
     names = [name for name in robot.link_names() if any(w in name.lower() for w in words)]
     lowest: dict[int, tuple[float, str]] = {}
-    joints = robot.frame_mounts(names)[0].tolist()
+    joints = robot.frame_mounts(names).joint.tolist()
     heights = robot.link_heights(names, robot.neutral()).tolist()
     for name, joint, height in zip(names, joints, heights, strict=True):
         lowest[joint] = min(lowest.get(joint, (np.inf, name)), (height, name))

@@ -1,134 +1,180 @@
-"""Contact kernels: kinematics of the contact points and constrained forward dynamics.
+"""Contact kernels: contact points, constrained forward dynamics, impacts and margins.
 
 Every foot is one or several points. A point's contact frame C has rows tangent, tangent, normal.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from sealag.kernels import dynamics
-from sealag.kernels.friction import solve, twist_torque
-from sealag.kernels.rigid import cholesky, forward_solve
+from sealag.kernels import friction
+from sealag.kernels.dynamics import Frames, Mounts, Terms, Tree, frame_terms, rigid_body_terms
+from sealag.kernels.friction import Equations, Surfaces
+from sealag.kernels.ledger import DISTURBANCE, HOLDING, SLIDING, TORSION
+from sealag.kernels.linalg import cholesky, forward_solve
+from sealag.kernels.motor import Motors
+from sealag.kernels.spatial import add, cross, dot, rotate, rotation, scale, vector
+from sealag.typing import Array, IntArray
+
+RISEN = 2e-5
+"""m: an opened point this high has left the ground. Ten times larger lets it fall again unnoticed;
+ten times smaller meets what stabilisation leaves below the ground."""
+
+
+class Contacts(NamedTuple):
+    """What surrounds the robot: P contact points of F feet, then loaded points, T together."""
+
+    frame: IntArray  # (T,) frame that carries each point
+    offset: Array  # (T, 3) m, in the frame's axes
+    C: Array  # (P, 3, 3) contact frames
+    anchor: Array  # (P, 3) m, where each point closed
+    friction: Array  # (P,) Coulomb coefficient
+    ridge: Array  # (P,) relative compliance that shares force between redundant points
+    radius: Array  # (P,) height of the frame over the ground when touching, m
+    torsion_damping: Array  # (F,) Nms/rad
+    torsion_radius: Array  # (F,) m
+    load: Array  # (T - P, 3) forces on the loaded points, N
+    closed: IntArray  # (P,) 1 if closed
+    yielding: Array  # (P,) how much a sliding point yields, 0 if it sticks
+    floor: Array  # (P,) how far below the ground an opened point may still be, m
+    ground_x: Array  # (G,) places of the ground's profile, m; empty if it has none
+    ground_z: Array  # (G,) its heights there, m
+    stabilisation: float  # rate at which a contact returns to its anchor, 1/s
+    stop_time: float  # s, in which friction may stop a point for it to stick
+    weight: float  # of the robot, N
+
+
+class Plant(NamedTuple):
+    """Robot, springs and surroundings."""
+
+    tree: Tree
+    mounts: Mounts  # of the feet's and the loaded frames
+    motors: Motors
+    contacts: Contacts
+
+
+class Instant(NamedTuple):
+    """State, contact forces and powers at one instant."""
+
+    q: Array  # (nq,) configuration
+    v: Array  # (nv,) velocity
+    theta: Array  # (n,) motor angles, rad
+    theta_dot: Array  # (n,) rad/s
+    tau_motor: Array  # (n,) motor torques, Nm
+    tau_sea: Array  # (n,) spring torques, Nm
+    acceleration: Array  # (nv,) v̇
+    force: Array  # (P, 3) in the contact frames, N
+    gap: Array  # (P,) height of each point over the ground, m; inf while it is loaded
+    position: Array  # (T, 3) of the points, m
+    velocity: Array  # (T, 3) m/s
+    power: Array  # (4,) HOLDING, SLIDING, TORSION, DISTURBANCE, W
+    energy: Array  # (2,) of the links, KINETIC and POTENTIAL, J
+
+
+class Work(NamedTuple):
+    """Memory for one evaluation."""
+
+    terms: Terms
+    frames: Frames
+    J: Array  # (T, 3, nv) Jacobians of the points
+    drift: Array  # (T, 3) their accelerations at zero v̇
+    equations: Equations
 
 
 @njit(cache=True)
-def memory_size(sizes):
-    """Return how many numbers `parts` divides."""
-    nq, nv, n, count, total, feet, mounted = sizes
-    state = nq + 2 * nv + 10 * n + 4 * count + 3 * total + 6
-    work = nv + nv * nv + 3 * count * (nv + 1) + total * (3 * nv + 6) + feet * (nv + 1)
-    return state + work + mounted * (6 * nv + 18)
+def plant_of(raw_plant):
+    """Return the named parts of raw ones."""
+    tree, mounts, motors, contacts = raw_plant
+    return Plant(Tree(*tree), Mounts(*mounts), Motors(*motors), Contacts(*contacts))
 
 
 @njit(cache=True)
-def motion(data, sizes):
-    """Return the first `parts` of an instant's memory: q, v, z (n, 9), acceleration, power (6,)."""
-    nq, nv, n = sizes[0], sizes[1], sizes[2]
-    first, last = nq + nv, nq + nv + 9 * n
-    return (
-        data[:nq], data[nq:first], data[first:last].reshape(n, 9), data[last : last + nv],
-        data[last + nv : last + nv + 6],
+def surfaces_of(contacts):
+    """Return the friction of the contact points."""
+    return Surfaces(
+        contacts.frame[: contacts.closed.size], contacts.friction, contacts.ridge,
+        contacts.torsion_damping, contacts.torsion_radius,
     )  # fmt: skip
 
 
 @njit(cache=True)
-def parts(data, sizes):
-    """Return the named parts of one instant's memory, in the order of `memory_size`.
-
-    Args:
-        data: (memory_size,).
-        sizes: nq, nv, n, contact points P, contact and loaded points T, feet, frames F.
-
-    Returns:
-        q, v, z (n, 9), acceleration (nv,), power (6,), tau (n,), force (P, 3), gap (P,),
-        position (T, 3), velocity, drift (T, 3), J (T, 3, nv), target (P, 3), rows (P, 3, nv),
-        right (nv,), L (nv, nv), twist_rows (feet, nv), spin (feet,), and of the frames J, R, p and
-        bias as in `dynamics.frames`.
-    """
-    nq, nv, n, count, total, feet, mounted = sizes
-    q, v, z, acceleration, power = motion(data, sizes)
-    data = data[nq + 2 * nv + 9 * n + 6 :]
-    tau, data = data[:n], data[n:]
-    force, data = data[: 3 * count].reshape(count, 3), data[3 * count :]
-    gap, data = data[:count], data[count:]
-    position, data = data[: 3 * total].reshape(total, 3), data[3 * total :]
-    velocity, data = data[: 3 * total].reshape(total, 3), data[3 * total :]
-    drift, data = data[: 3 * total].reshape(total, 3), data[3 * total :]
-    J, data = data[: 3 * total * nv].reshape(total, 3, nv), data[3 * total * nv :]
-    target, data = data[: 3 * count].reshape(count, 3), data[3 * count :]
-    rows, data = data[: 3 * count * nv].reshape(count, 3, nv), data[3 * count * nv :]
-    right, data = data[:nv], data[nv:]
-    L, data = data[: nv * nv].reshape(nv, nv), data[nv * nv :]
-    twist_rows, data = data[: feet * nv].reshape(feet, nv), data[feet * nv :]
-    spin, data = data[:feet], data[feet:]
-    mounted_J, data = data[: 6 * mounted * nv].reshape(mounted, 6, nv), data[6 * mounted * nv :]
-    R, data = data[: 9 * mounted].reshape(mounted, 3, 3), data[9 * mounted :]
-    p, data = data[: 3 * mounted].reshape(mounted, 3), data[3 * mounted :]
-    bias = data.reshape(mounted, 6)
-    return (
-        q, v, z, acceleration, power, tau, force, gap, position, velocity, drift, J, target, rows,
-        right, L, twist_rows, spin, mounted_J, R, p, bias,
+def allocate_work(plant, terms):
+    """Return memory for evaluations of a plant."""
+    nv, contacts = terms.nle.size, plant.contacts
+    total, count = contacts.frame.size, plant.mounts.joint.size
+    frames = Frames(
+        np.zeros((count, 6, nv)), np.zeros((count, 3, 3)), np.zeros((count, 3)),
+        np.zeros((count, 6)),
     )  # fmt: skip
+    equations = friction.allocate_equations(nv, contacts.closed.size, contacts.torsion_radius.size)
+    return Work(terms, frames, np.zeros((total, 3, nv)), np.zeros((total, 3)), equations)
 
 
 @njit(cache=True)
-def points(J_frame, R, p, drift_frame, v, frame_of, offset, J, position, velocity, drift):
-    """Write Jacobian, position, velocity and velocity-product acceleration of every point.
-
-    J_frame (F, 6, nv), R (F, 3, 3), p (F, 3), drift_frame (F, 6): world-aligned frames, linear
-    rows first; offset (P, 3) in frame ``frame_of[i]``.
-    """
-    nv = v.size
-    r = np.empty(3)
-    omega = np.empty(3)
-    for i in range(frame_of.size):
-        f = frame_of[i]
-        for a in range(3):
-            s = 0.0
-            for b in range(3):
-                s += R[f, a, b] * offset[i, b]
-            r[a] = s
-            position[i, a] = p[f, a] + s
-            w = 0.0
-            for c in range(nv):
-                w += J_frame[f, 3 + a, c] * v[c]
-            omega[a] = w
+def _place_points(contacts, at, work):
+    """Write Jacobian, position, velocity and acceleration at zero v̇ of every point."""
+    nv = at.v.size
+    for i in range(contacts.frame.size):
+        f = contacts.frame[i]
+        J, frame_J = work.J[i], work.frames.J[f]
+        arm = rotate(rotation(work.frames.R, f), vector(contacts.offset, i))
+        at.position[i, 0], at.position[i, 1], at.position[i, 2] = add(
+            vector(work.frames.p, f), arm
+        )  # fmt: skip
+        speed, spin = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for c in range(nv):
-            x, y, z = J_frame[f, 3, c], J_frame[f, 4, c], J_frame[f, 5, c]
-            J[i, 0, c] = J_frame[f, 0, c] + y * r[2] - z * r[1]
-            J[i, 1, c] = J_frame[f, 1, c] + z * r[0] - x * r[2]
-            J[i, 2, c] = J_frame[f, 2, c] + x * r[1] - y * r[0]
-        dot = omega[0] * r[0] + omega[1] * r[1] + omega[2] * r[2]
-        square = omega[0] ** 2 + omega[1] ** 2 + omega[2] ** 2
-        for a in range(3):
-            b, c = (a + 1) % 3, (a + 2) % 3
-            turn = drift_frame[f, 3 + b] * r[c] - drift_frame[f, 3 + c] * r[b]
-            drift[i, a] = drift_frame[f, a] + turn + omega[a] * dot - r[a] * square
-            s = 0.0
-            for k in range(nv):
-                s += J[i, a, k] * v[k]
-            velocity[i, a] = s
+            turn = (frame_J[3, c], frame_J[4, c], frame_J[5, c])
+            column = add((frame_J[0, c], frame_J[1, c], frame_J[2, c]), cross(turn, arm))
+            J[0, c], J[1, c], J[2, c] = column
+            speed, spin = add(speed, scale(at.v[c], column)), add(spin, scale(at.v[c], turn))
+        at.velocity[i, 0], at.velocity[i, 1], at.velocity[i, 2] = speed
+        drift = work.frames.drift
+        bend = cross((drift[f, 3], drift[f, 4], drift[f, 5]), arm)
+        work.drift[i, 0], work.drift[i, 1], work.drift[i, 2] = add(
+            add(vector(drift, f), bend), cross(spin, cross(spin, arm))
+        )  # fmt: skip
 
 
 @njit(cache=True)
-def demand(C, position, anchor, velocity, drift, gain, stop_time, out):
-    """Write the part of every point's contact equation that is not J x (P, 3).
-
-    Tangent rows: J̇v + v_t / stop_time. Normal row: J̇v + 2 gain v_n + gain² (p - anchor)_n.
-    """
-    for i in range(C.shape[0]):
+def _apply(plant, at, work):
+    """Write spring torques, L⁻¹ times all forces but the contacts', and the loads' power."""
+    motors, contacts, free = plant.motors, plant.contacts, work.equations.free
+    nv, n, count = at.v.size, at.theta.size, contacts.closed.size
+    for i in range(nv):
+        free[i] = -work.terms.nle[i]
+    for i in range(n):
+        speed = at.v[nv - n + i]
+        at.tau_sea[i] = motors.stiffness[i] * (at.theta[i] - at.q[at.q.size - n + i])
+        at.tau_sea[i] += motors.spring_damping[i] * (at.theta_dot[i] - speed)
+        free[nv - n + i] += at.tau_sea[i] - motors.bearing[i] * speed
+    at.power[DISTURBANCE] = 0.0
+    for k in range(contacts.load.shape[0]):
         for a in range(3):
-            s = 0.0
-            for b in range(3):
-                if a < 2:
-                    s += C[i, a, b] * (drift[i, b] + velocity[i, b] / stop_time)
-                else:
-                    s += C[i, a, b] * (
-                        drift[i, b]
-                        + 2.0 * gain * velocity[i, b]
-                        + gain * gain * (position[i, b] - anchor[i, b])
-                    )
-            out[i, a] = s
+            force = contacts.load[k, a]
+            if force != 0.0:
+                at.power[DISTURBANCE] += force * at.velocity[count + k, a]
+                for c in range(nv):
+                    free[c] += work.J[count + k, a, c] * force
+    forward_solve(work.equations.L, free)
+
+
+@njit(cache=True)
+def _demand(contacts, at, work):
+    """Write the part of every point's contact equation that is not J v̇ (P, 3).
+
+    Tangent rows: J̇v + v_t / stop_time. Normal row: J̇v + 2 rate v_n + rate² (p - anchor)_n.
+    """
+    rate = contacts.stabilisation
+    for i in range(contacts.closed.size):
+        first, second, normal = rotation(contacts.C, i)
+        drift, speed = vector(work.drift, i), vector(at.velocity, i)
+        sliding = add(drift, scale(1.0 / contacts.stop_time, speed))
+        sunk = add(vector(at.position, i), scale(-1.0, vector(contacts.anchor, i)))
+        back = add(scale(2.0 * rate, speed), scale(rate * rate, sunk))
+        target = work.equations.target
+        target[i, 0], target[i, 1] = dot(first, sliding), dot(second, sliding)
+        target[i, 2] = dot(normal, add(drift, back))
 
 
 @njit(cache=True)
@@ -147,193 +193,200 @@ def project(L, J, C, wanted, rows):
 
 
 @njit(cache=True)
-def twist(L, J_frame, v, C, foot_of, torsion, rows, spin):
-    """Write L⁻¹ Jᵀ of every foot's turn about its normal (F, nv) and its rate (F,), rad/s.
-
-    Feet without torsional damping, the first column of ``torsion``, are left out.
-    """
-    spin[:] = 0.0
+def _twist(contacts, v, work):
+    """Write L⁻¹ Jᵀ of the turn about the normal of feet with torsional damping, and its rate."""
+    eq = work.equations
+    eq.spin[:] = 0.0
     last = -1
-    for i in range(foot_of.size):
-        f = foot_of[i]
-        if f == last or torsion[f, 0] == 0.0:
+    for i in range(contacts.closed.size):
+        f = contacts.frame[i]
+        if f == last or contacts.torsion_damping[f] == 0.0:
             continue
         last = f
         for c in range(v.size):
             s = 0.0
             for a in range(3):
-                s += C[i, 2, a] * J_frame[f, 3 + a, c]
-            rows[f, c] = s
-            spin[f] += s * v[c]
-        forward_solve(L, rows[f])
+                s += contacts.C[i, 2, a] * work.frames.J[f, 3 + a, c]
+            eq.twist_rows[f, c] = s
+            eq.spin[f] += s * v[c]
+        forward_solve(eq.L, eq.twist_rows[f])
 
 
 @njit(cache=True)
-def smallest_margin(C, velocity, force, gap, closed, weight):
+def _write_powers(contacts, at, work):
+    """Write the powers of the contacts' forces and the energy of the links."""
+    power, eq = at.power, work.equations
+    power[HOLDING] = power[SLIDING] = power[TORSION] = 0.0
+    for i in range(contacts.closed.size):
+        if contacts.closed[i]:
+            first, second, normal = rotation(contacts.C, i)
+            speed, (along, across, load) = vector(at.velocity, i), vector(at.force, i)
+            power[HOLDING] += load * dot(normal, speed)
+            power[SLIDING] += along * dot(first, speed) + across * dot(second, speed)
+    for f in range(eq.spin.size):
+        power[TORSION] += eq.torque[f] * eq.spin[f]
+    at.energy[:] = work.terms.energy
+
+
+@njit(cache=True)
+def _prepare(plant, at, work):
+    """Write everything at an instant that its contact forces follow from; False if M is singular."""
+    rigid_body_terms(plant.tree, at.q, at.v, work.terms)
+    frame_terms(work.terms, plant.mounts, work.frames)
+    _place_points(plant.contacts, at, work)
+    if not cholesky(work.terms.M, work.equations.L):
+        return False
+    _apply(plant, at, work)
+    _demand(plant.contacts, at, work)
+    _twist(plant.contacts, at.v, work)
+    return True
+
+
+@njit(cache=True)
+def accelerate(plant, at, work):
+    """Write spring torques, contact forces and acceleration at an instant, from its state.
+
+    Returns:
+        False if there is no solution.
+    """
+    if not _prepare(plant, at, work):
+        return False
+    contacts, eq = plant.contacts, work.equations
+    project(eq.L, work.J, contacts.C, contacts.closed, eq.rows)
+    solved = friction.solve(
+        eq, surfaces_of(contacts), contacts.closed, contacts.yielding, at.acceleration, at.force
+    )
+    _write_powers(contacts, at, work)
+    return solved
+
+
+@njit(cache=True)
+def evaluate(raw_plant, raw_terms, raw_now):
+    """Evaluate dynamics and contact forces at an instant; False if there is no solution."""
+    plant = plant_of(raw_plant)
+    return accelerate(plant, Instant(*raw_now), allocate_work(plant, Terms(*raw_terms)))
+
+
+@njit(cache=True)
+def resolve(raw_plant, raw_terms, raw_now, touching, impact, impulse):
+    """Find which touching points stay closed, by an impact or under the forces of an instant.
+
+    Args:
+        raw_plant: the plant; closed and yielding of its contacts are changed.
+        raw_terms: scratch.
+        raw_now: the instant; an impact changes its velocity.
+        touching: (P,) which points may be closed.
+        impact: whether the points' velocities end in a plastic impact, else forces are sought.
+        impulse: (P, 3) of the impact, Ns, written.
+
+    Returns:
+        As `friction.settle`, and the energy that an impact takes, J.
+    """
+    plant, now = plant_of(raw_plant), Instant(*raw_now)
+    work, contacts = allocate_work(plant, Terms(*raw_terms)), plant.contacts
+    eq, surfaces, tolerance = work.equations, surfaces_of(contacts), 1e-9 * contacts.weight
+    if not _prepare(plant, now, work):
+        return friction.UNSOLVABLE, 0.0
+    project(eq.L, work.J, contacts.C, touching, eq.rows)
+    x = np.zeros(now.v.size)
+    if not impact:
+        status = friction.settle(
+            eq, surfaces, touching, contacts.closed, contacts.yielding, tolerance, x,
+            now.force.copy(),
+        )  # fmt: skip
+        return status, 0.0
+    eq.target[:], eq.spin[:], impulse[:] = 0.0, 0.0, 0.0
+    for c in range(now.v.size):
+        eq.free[c] = 0.0
+        for k in range(c, now.v.size):
+            eq.free[c] += eq.L[k, c] * now.v[k]
+    status = friction.settle(
+        eq, surfaces, touching, contacts.closed, np.zeros(touching.size), tolerance, x, impulse
+    )
+    lost = 0.0
+    for i in range(touching.size):
+        mean = (0.0, 0.0, 0.0)
+        for c in range(now.v.size):
+            half, J = 0.5 * (now.v[c] + x[c]), work.J[i]
+            mean = add(mean, scale(half, (J[0, c], J[1, c], J[2, c])))
+        lost -= dot(rotate(rotation(contacts.C, i), mean), vector(impulse, i))
+    now.v[:] = x
+    return status, lost
+
+
+@njit(cache=True)
+def ground_height(contacts, x):
+    """Return the height of the ground's profile at x, m: linear between places, level beyond."""
+    places, heights = contacts.ground_x, contacts.ground_z
+    k = np.searchsorted(places, x, side="right")
+    if k == 0:
+        return heights[0]
+    if k == places.size:
+        return heights[k - 1]
+    slope = (heights[k] - heights[k - 1]) / (places[k] - places[k - 1])
+    return heights[k - 1] + slope * (x - places[k - 1])
+
+
+@njit(cache=True)
+def measure_gaps(contacts, at):
+    """Write the gaps of all points over the ground's profile."""
+    for i in range(contacts.closed.size):
+        if contacts.closed[i]:
+            at.gap[i] = np.inf
+            continue
+        x, _, z = vector(at.position, i)
+        height = z - contacts.radius[i] - ground_height(contacts, x)
+        if height > RISEN:
+            contacts.floor[i] = 0.0
+        at.gap[i] = height - contacts.floor[i]
+
+
+@njit(cache=True)
+def smallest_margin(contacts, at):
     """Return the smallest margin and its point: how far it is from ending its condition.
 
     Open: the gap (m), inf if it widens. Closed: the normal force in body weights.
     """
-    smallest, point = np.inf, 0
-    for i in range(closed.size):
-        if closed[i]:
-            margin = force[i, 2] / weight
+    smallest, point = np.inf, -1
+    for i in range(contacts.closed.size):
+        if contacts.closed[i]:
+            margin = at.force[i, 2] / contacts.weight
         else:
-            rate = 0.0
-            for b in range(3):
-                rate += C[i, 2, b] * velocity[i, b]
-            margin = gap[i] if rate < 0.0 else np.inf
-        if not margin >= smallest:
+            _, _, normal = rotation(contacts.C, i)
+            margin = at.gap[i] if dot(normal, vector(at.velocity, i)) < 0.0 else np.inf
+        if point < 0 or not margin >= smallest:
             smallest, point = margin, i
     return smallest, point
 
 
 @njit(cache=True)
-def _contact_power(C, velocity, force, closed, out):
-    """Write the power of normal (out[0]) and tangential (out[1]) contact forces."""
-    out[0] = 0.0
-    out[1] = 0.0
-    for i in range(closed.size):
-        if closed[i]:
-            for b in range(3):
-                out[0] += force[i, 2] * C[i, 2, b] * velocity[i, b]
-                tangent = force[i, 0] * C[i, 0, b] + force[i, 1] * C[i, 1, b]
-                out[1] += tangent * velocity[i, b]
+def margin(raw_contacts, raw_now):
+    """Return the smallest margin of an instant and its point, see `smallest_margin`."""
+    return smallest_margin(Contacts(*raw_contacts), Instant(*raw_now))
 
 
 @njit(cache=True)
-def _apply(nle, joint, parameters, z, v, load, J, velocity, tau, right):
-    """Write spring torques and all applied generalised forces, the damping of the joints among
-    them; return the power of the loads."""
-    nv, n = v.size, joint.size
-    for i in range(nv):
-        right[i] = -nle[i]
-    for i in range(n):
-        tau[i] = parameters[i, 0] * (z[i, 0] - joint[i])
-        tau[i] += parameters[i, 1] * (z[i, 1] - v[nv - n + i])
-        right[nv - n + i] += tau[i] - parameters[i, 10] * v[nv - n + i]
-    power = 0.0
-    for k in range(load.shape[0]):
-        for a in range(3):
-            if load[k, a] != 0.0:
-                power += load[k, a] * velocity[k, a]
-                for c in range(nv):
-                    right[c] += J[k, a, c] * load[k, a]
-    return power
-
-
-@njit(cache=True)
-def evaluate(tree, terms, around, state, rates, parameters, data, sizes):
-    """Spring torque, applied forces, contact forces and acceleration at one instant.
-
-    Args:
-        tree: the robot, as `sealag.robot.Robot.tree`.
-        terms: its terms, as `dynamics.allocate` returns them, written.
-        around: what surrounds the robot: mounts of the feet's and loaded frames as
-            `sealag.robot.Robot.frame_mounts` gives them (4 arrays), frame (T,) and offset (T, 3)
-            of every point, C (P, 3, 3), anchor (P, 3), mu and ridge (P,), torsion (feet, 2) as in
-            ``friction.solve``, load (T - P, 3) N.
-        state: closed and yielding (P,).
-        rates: stabilisation rate 1/s, time in which friction may stop a point s.
-        parameters: of the actuators, as in ``motor``.
-        data: the instant's memory; q, v and the first two columns of z are read, the rest is
-            written. Powers: normal, tangential, torsional, load; then kinetic energy
-            and gravity potential.
-        sizes: as in `parts`.
-
-    Returns:
-        False if there is no solution.
-    """
-    (
-        q, v, z, acceleration, power, tau, force, _, position, velocity, drift, J, target, rows,
-        right, L, twist_rows, spin, mounted_J, R, p, bias,
-    ) = parts(data, sizes)  # fmt: skip
-    frame_of, offset, C, anchor, mu, ridge, torsion, load = around[4:]
-    closed, yielding = state
-    M, count = terms[0], closed.size
-    foot_of, joint = frame_of[:count], q[q.size - tau.size :]
-    dynamics.evaluate(tree, q, v, terms)
-    dynamics.frames(terms, around[:4], mounted_J, R, p, bias)
-    points(mounted_J, R, p, bias, v, frame_of, offset, J, position, velocity, drift)
-    power[3] = _apply(
-        terms[1], joint, parameters, z, v, load, J[count:], velocity[count:], tau, right
-    )
-    power[4:] = terms[10]
-    demand(C, position, anchor, velocity, drift, rates[0], rates[1], target)
-    if not cholesky(M, L):
-        return False
-    project(L, J, C, closed, rows)
-    twist(L, mounted_J, v, C, foot_of, torsion, twist_rows, spin)
-    free = right.copy()
-    forward_solve(L, free)
-    solved = solve(
-        L, rows, free, target, closed, mu, ridge, yielding, foot_of, torsion, twist_rows, spin,
-        acceleration, force,
-    )  # fmt: skip
-    _contact_power(C, velocity, force, closed, power)
-    power[2] = _torsion_power(force, closed, foot_of, torsion, spin)
-    return solved
-
-
-@njit(cache=True)
-def sense(data, sizes, closed, foot_of, t, out):
+def write_measurement(at, contacts, t, row):
     """Write what the sensors measure at an instant.
 
     Args:
-        data: the instant's memory, evaluated.
-        sizes: as in `parts`.
-        closed: (P,) whether each contact point is closed.
-        foot_of: (P,) its foot.
+        at: the instant, evaluated.
+        contacts: what is closed.
         t: the time that the measurement says, s.
-        out: the row of a `sealag.whole_body.Measurement`, written.
+        row: of a `sealag.whole_body.Measurement`: time, q, v, theta, theta_dot, tau_sea and one
+            flag for each foot; written.
     """
-    nq, nv, n = sizes[0], sizes[1], sizes[2]
-    q, v, z = motion(data, sizes)[:3]
-    tau = data[nq + 2 * nv + 9 * n + 6 :]
-    first = 1 + nq + nv
-    out[0], out[1 : 1 + nq], out[1 + nq : first] = t, q, v
-    for i in range(n):
-        out[first + i], out[first + n + i], out[first + 2 * n + i] = z[i, 0], z[i, 1], tau[i]
-    out[first + 3 * n :] = 0.0
-    for i in range(closed.size):
-        if closed[i]:
-            out[first + 3 * n + foot_of[i]] = 1.0
+    row[0], place = t, 1
+    for part in (at.q, at.v, at.theta, at.theta_dot, at.tau_sea):
+        row[place : place + part.size] = part
+        place += part.size
+    row[place:] = 0.0
+    for i in range(contacts.closed.size):
+        if contacts.closed[i]:
+            row[place + contacts.frame[i]] = 1.0
 
 
 @njit(cache=True)
-def _torsion_power(force, closed, foot_of, torsion, spin):
-    torque = np.zeros(spin.size)
-    twist_torque(force, closed, foot_of, torsion, spin, torque)
-    power = 0.0
-    for f in range(spin.size):
-        power += torque[f] * spin[f]
-    return power
-
-
-def example():
-    """Return arguments of `evaluate` with the types used in practice: one foot, one joint."""
-    nv, count = 7, 1
-    sizes = (8, nv, 1, count, count, 1, 1)
-    mounts = (np.ones(1, np.int64), np.eye(3)[None], np.zeros((1, 3)), np.ones((1, nv), np.int64))
-    ground = (np.eye(3)[None], np.zeros((1, 3)), np.ones(1), np.zeros(1))
-    around = (
-        *mounts, np.zeros(1, np.int64), np.zeros((1, 3)), *ground, np.zeros((1, 2)),
-        np.zeros((0, 3)),
-    )  # fmt: skip
-    tree, terms = dynamics.example(nv)
-    parameters = np.array([[350.0, 0.0, 0.1, 2.0, 10.0, 0.0, 0.1, np.inf, np.inf, np.inf, 0.0]])
-    state, data = (np.ones(1, np.int64), np.zeros(1)), np.zeros(memory_size(sizes))
-    data[6] = 1.0
-    return tree, terms, around, state, (50.0, 1e-3), parameters, data, sizes
-
-
-def warm() -> None:
-    """Compile every kernel with the types used in practice."""
-    arguments = example()
-    evaluate(*arguments)
-    C, state, data, sizes = arguments[2][6], arguments[3], arguments[6], arguments[7]
-    one, instant = np.zeros((1, 3)), parts(data, sizes)
-    sense(data, sizes, state[0], arguments[2][4], 0.0, np.zeros(1 + 8 + 7 + 3 + 1))
-    project(instant[15], instant[11], C, state[0], instant[13])
-    demand(C, one, one, one, one, 50.0, 1e-3, one.copy())
-    smallest_margin(C, one, one, np.zeros(1), state[0], 1.0)
+def sense(raw_contacts, raw_now, t, row):
+    """Write what the sensors measure at an instant, see `write_measurement`."""
+    write_measurement(Instant(*raw_now), Contacts(*raw_contacts), t, row)

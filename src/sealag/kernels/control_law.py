@@ -1,94 +1,212 @@
-"""A tick of the whole-body controller: task errors and matrices, torques, and q̄(θ)."""
+"""The whole-body law: task errors and matrices, torques, q̄(θ) and the energy tank."""
+
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from sealag.kernels import dynamics
-from sealag.kernels.dense import multiply
-from sealag.kernels.operational_space import divide, memory_size, operational_space, task_torque
-from sealag.kernels.rigid import integrate
+from sealag.kernels.dynamics import (
+    Frames,
+    Mounts,
+    Terms,
+    Tree,
+    frame_terms,
+    gravity_hessian,
+    rigid_body_terms,
+)
+from sealag.kernels.linalg import eliminate, multiply
+from sealag.kernels.operational_space import (
+    Space,
+    divide,
+    operational_space,
+    task_torque,
+)
+from sealag.kernels.spatial import integrate
+from sealag.typing import Array, IntArray
 
-OF_FRAME, OF_MASS, OF_JOINT = 0, 1, 2
+OF_FRAME, OF_MASS, OF_JOINT = 0, 1, 2  # what a task row measures
+EXISTS, SINGULAR_MASS, NO_STATIC_STATE = range(3)  # how `static` ends
+_PIVOT = 1e-12
+"""Of a spring: pivots below count as none. Rounding leaves 1e-15; a law within 1e-12 of its springs'
+stiffness has no use."""
+
+
+class Tasks(NamedTuple):
+    """Contacts and tasks about a posture: c contact rows, m task rows in k levels, F frames."""
+
+    contact_frame: IntArray  # (c,)
+    contact_row: IntArray  # (c,) of its Jacobian
+    kind: IntArray  # (m,) OF_FRAME, OF_MASS or OF_JOINT
+    frame: IntArray  # (m,) where kind is OF_FRAME
+    row: IntArray  # (m,) of what it measures
+    levels: IntArray  # (k + 1,) first row of each level, then m
+    R: Array  # (F, 3, 3) wanted rotations of frames
+    p: Array  # (F, 3) wanted positions of frames, m
+    x: Array  # (m,) wanted values of the other rows
+
+
+class Gains(NamedTuple):
+    """How errors become torques."""
+
+    K_x: Array  # (m, m) task stiffness
+    planned_gravity: Array  # (n,) Nm
+    springs: Array  # (n,) K, Nm/rad
+    form: int  # SYMMETRIC, PUBLISHED or FORCE
+    star: bool  # whether stiffness uses Λ*
+    tolerance: float  # below which a direction counts as lost
+    consistent: bool  # whether tasks leave errors to higher ones
+    fed_back: bool  # whether gravity compensation is of the joint angles instead of planned
+
+
+class Evaluation(NamedTuple):
+    """The law where it was last evaluated."""
+
+    along: Array  # (nv, n) motions by which the base follows the joints
+    offset: Array  # (m,) of the references
+    shift: Array  # (nv,) from the measured configuration
+    q: Array  # (nq,) configuration
+    J_s: Array  # (c, nv) contact Jacobian
+    J_t: Array  # (m, nv) task Jacobian
+    error: Array  # (m,) x̃
+    wanted: Array  # (m,) x_d about the posture's
+
+
+class Newton(NamedTuple):
+    """Memory for q̄(θ)."""
+
+    H: Array  # (nv, nv) ∂²V/∂q²
+    moved: Array  # (nv, n) H along the contact-consistent motions
+    slope: Array  # (n, n) ∂ḡ/∂q_j; 0 unless it is fed back
+    J: Array  # (m, n) minus the errors' Jacobian
+    square: Array  # (n, n)
+    step: Array  # (n,)
+
+
+class Control(NamedTuple):
+    """A law and all that it is evaluated with."""
+
+    tree: Tree
+    mounts: Mounts  # of the contacts' frames, then the tasks'
+    tasks: Tasks
+    gains: Gains
+    terms: Terms
+    frames: Frames
+    at: Evaluation
+    newton: Newton
+    space: Space
+
+
+class Reservoir(NamedTuple):
+    """The energy tank and x̂, see `sealag.whole_body.EnergyTank`."""
+
+    position: Array  # (m,) x̂, from the posture's own
+    theta: Array  # (n,) motor angles at the last step, rad
+    energy: Array  # (1,) J
+    rate: float  # at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s
+    delay_bound: float  # s
+    corrected: bool  # whether the tank pays for u's work on the potential
 
 
 @njit(cache=True)
-def law(tree, terms, seen, tasks, gains, state, results, memory, sizes):
+def control_of(raw_control):
+    """Return the named parts of raw ones; the last is the memory of the space."""
+    tree, mounts, tasks, gains, terms, frames, at, newton, memory = raw_control
+    control = Tasks(*tasks), Gains(*gains), Terms(*terms), Evaluation(*at)
+    tasks, gains, terms, at = control
+    m, c = at.error.size, at.J_s.shape[0]
+    space = divide(memory, terms.nle.size, gains.springs.size, c, m)
+    return Control(
+        Tree(*tree), Mounts(*mounts), tasks, gains, terms, Frames(*frames), at, Newton(*newton),
+        space,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def law(raw_control, q, joints, out):
+    """Write the law's torque at given joint angles, see `evaluate`."""
+    return evaluate(control_of(raw_control), q, joints, out)
+
+
+@njit(cache=True)
+def evaluate(control, q, joints, out):
     """Write the torque J*ᵀ S x̃ + ḡ at given joint angles, and everything that it is made of.
 
     The base follows the joints along the contact-consistent motions from the measured state.
 
     Args:
-        tree: the robot, as `sealag.robot.Robot.tree`.
-        terms: its terms, as `dynamics.allocate` returns them, written.
-        seen: how the contacts' frames, then the tasks', are fixed (4 arrays, see
-            `sealag.robot.Robot.frame_mounts`), and their J, R, p and bias as in
-            `dynamics.frames`, written.
-        tasks: rows of contacts (c, 2): frame and its row; rows of tasks (m, 3): OF_FRAME, OF_MASS
-            or OF_JOINT, frame, row of it; the levels' first rows (k + 1,); wanted rotations
-            (F, 3, 3) and positions (F, 3) of frames, and values of the other rows (m,).
-        gains: K_x (m, m), planned gravity compensation (n,); form, star and tolerance as in
-            `operational_space`; whether tasks leave errors to higher ones; whether gravity
-            compensation is of the given joint angles instead of planned.
-        state: measured configuration (nq,), joint angles (n,), contact-consistent motions (nv, n),
-            offset of the references (m,).
-        results: J_s (c, nv), J_t (m, nv), x̃ (m,), x_d (m,) about the posture's, torque (n,).
-        memory: of the operational space, as `divide` divides it, written.
-        sizes: nv, n, c, m.
+        control: the law; all that is evaluated is written.
+        q: (nq,) measured configuration.
+        joints: (n,) joint angles.
+        out: (n,) torque, Nm, written.
 
     Returns:
         False if the mass matrix is not positive definite.
     """
-    J, R, p, bias = seen[4:]
-    contact_rows, levels = tasks[0], tasks[2]
-    K_x, planned, form, star, tolerance, consistent, fed_back = gains
-    q, joints, along, offset = state
-    J_s, J_t, error, wanted, out = results
-    nv, n, c, m = sizes
-    space = divide(memory, nv, n, c, m)
-    shift, there, still = np.zeros(nv), np.empty(q.size), np.zeros(nv)
+    tree, terms, tasks, gains, at = (
+        control.tree, control.terms, control.tasks, control.gains, control.at,
+    )  # fmt: skip
+    n, space = joints.size, control.space
+    nv = terms.nle.size
+    at.shift[:] = 0.0
     for i in range(n):
         away = joints[i] - q[q.size - n + i]
         for k in range(nv):
-            shift[k] += along[k, i] * away
-    integrate(q, shift, nv - n, there)
-    dynamics.evaluate(tree, there, still, terms)
-    dynamics.frames(terms, seen[:4], J, R, p, bias)
-    for r in range(c):
-        J_s[r] = J[contact_rows[r, 0], contact_rows[r, 1]]
-    _read_tasks(terms, seen[4:], tasks, there[q.size - n :], J_t, error)
+            at.shift[k] += at.along[k, i] * away
+    integrate(q, at.shift, nv - n, at.q)
+    at.shift[:] = 0.0
+    rigid_body_terms(tree, at.q, at.shift, terms)  # at rest
+    frame_terms(terms, control.mounts, control.frames)
+    for r in range(tasks.contact_frame.size):
+        at.J_s[r] = control.frames.J[tasks.contact_frame[r], tasks.contact_row[r]]
+    _read_tasks(tasks, terms, control.frames, at)
     if not operational_space(
-        terms[0], terms[1], J_s, J_t, K_x, levels, form, star, tolerance, space
-    ):
+        terms.M, terms.nle, at.J_s, at.J_t, gains.K_x, tasks.levels, gains.form, gains.star,
+        gains.tolerance, space,
+    ):  # fmt: skip
         return False
-    for r in range(m):
-        error[r] += offset[r]
-        wanted[r] = offset[r]
-    if consistent and levels.size > 2:
-        leave_to_higher(J_t, space.lift, levels, error, shift)
-        leave_to_higher(J_t, space.lift, levels, wanted, shift)
-    task_torque(space.J_star, space.stiffness, error, space.gravity if fed_back else planned, out)
+    for r in range(at.error.size):
+        at.error[r] += at.offset[r]
+        at.wanted[r] = at.offset[r]
+    if gains.consistent and tasks.levels.size > 2:
+        leave_to_higher(at.J_t, space.lift, tasks.levels, at.error, at.shift)
+        leave_to_higher(at.J_t, space.lift, tasks.levels, at.wanted, at.shift)
+    _write_torque(control, out)
     return True
 
 
 @njit(cache=True)
-def _read_tasks(terms, placed, tasks, joints, J_t, error):
+def _write_torque(control, out):
+    """Write the torque of the errors and matrices that stand here now."""
+    space, gains = control.space, control.gains
+    gravity = space.gravity if gains.fed_back else gains.planned_gravity
+    task_torque(space.J_star, space.stiffness, control.at.error, gravity, out)
+
+
+@njit(cache=True)
+def torque(raw_control, out):
+    """Write the torque (n,) of the errors and matrices that stand here now."""
+    _write_torque(control_of(raw_control), out)
+
+
+@njit(cache=True)
+def _read_tasks(tasks, terms, frames, at):
     """Write Jacobians and errors of all task rows."""
-    J, R, p, _ = placed
-    _, task_rows, _, R_wanted, p_wanted, x_wanted = tasks
-    base = J_t.shape[1] - joints.size
     both, last = np.empty(6), -1
-    for r in range(error.size):
-        kind, frame, row = task_rows[r, 0], task_rows[r, 1], task_rows[r, 2]
+    n = at.along.shape[1]
+    first_q, base = at.q.size - n, at.along.shape[0] - n
+    for r in range(at.error.size):
+        kind, frame, row = tasks.kind[r], tasks.frame[r], tasks.row[r]
         if kind == OF_FRAME:
             if frame != last:
-                frame_error(R_wanted[frame], p_wanted[frame], R[frame], p[frame], both)
+                frame_error(tasks.R[frame], tasks.p[frame], frames.R[frame], frames.p[frame], both)
                 last = frame
-            J_t[r], error[r] = J[frame, row], both[row]
+            at.J_t[r], at.error[r] = frames.J[frame, row], both[row]
         elif kind == OF_MASS:
-            J_t[r], error[r] = terms[8][row], x_wanted[r] - terms[7][0, row]
+            at.J_t[r], at.error[r] = terms.com_jacobian[row], tasks.x[r] - terms.com[row]
         else:
-            J_t[r], error[r] = 0.0, x_wanted[r] - joints[row]
-            J_t[r, base + row] = 1.0
+            at.J_t[r], at.error[r] = 0.0, tasks.x[r] - at.q[first_q + row]
+            at.J_t[r, base + row] = 1.0
 
 
 @njit(cache=True)
@@ -174,30 +292,27 @@ def _turn_about(R_wanted, R, cosine, angle, out):
 
 
 @njit(cache=True)
-def gravity_slope(tree, terms, along, H, work, out):
+def gravity_slope(tree, terms, along, newton):
     """Write ∂ḡ/∂q_j along the contact-consistent motions, with these motions frozen: Wᵀ H W.
 
     Args:
-        tree: as in `law`.
-        terms: as `law` left them.
+        tree: the robot.
+        terms: of it, evaluated.
         along: (nv, n) W.
-        H: (nv, nv) scratch.
-        work: (nv, n) scratch.
-        out: (n, n) Nm/rad, written.
+        newton: H, moved and slope are written.
     """
-    dynamics.gravity_gradient(tree, terms, H)
-    multiply(H, along, work)
+    gravity_hessian(tree, terms, newton.H)
+    multiply(newton.H, along, newton.moved)
     nv, n = along.shape
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for k in range(nv):
-                total += along[k, i] * work[k, j]
-            out[i, j] = total
+    newton.slope[:] = 0.0
+    for k in range(nv):
+        for i in range(n):
+            for j in range(n):
+                newton.slope[i, j] += along[k, i] * newton.moved[k, j]
 
 
 @njit(cache=True)
-def static_step(J_star, moved, stiffness, slope, K, torque, sag, work, step):
+def static_step(J_star, stiffness, springs, torque, sag, newton):
     """One Newton step towards K (θ − q̄) = l(q̄), Eqs. (15), (16), with sag = q̄ − θ.
 
     (K − J*ᵀ S J + ∂ḡ/∂q) δ = −K sag − l by elimination, −J the errors' Jacobian; then
@@ -205,20 +320,18 @@ def static_step(J_star, moved, stiffness, slope, K, torque, sag, work, step):
 
     Args:
         J_star: (m, n).
-        moved: (m, n) J: J* itself where lower tasks leave errors to higher ones.
         stiffness: (m, m) S.
-        slope: (n, n) ∂ḡ/∂q of the gravity compensation, 0 if it is not fed back.
-        K: (n,) spring stiffness.
+        springs: (n,) K, Nm/rad.
         torque: (n,) l at θ + sag.
         sag: (n,), moved.
-        work: (n, n) scratch.
-        step: (n,) δ.
+        newton: slope and J are read; square and step (n,) δ are written.
 
     Returns:
         False if a pivot is not positive: the task is stiffer than the springs.
     """
     m, n = J_star.shape
-    work[:, :] = slope
+    square, step = newton.square, newton.step
+    square[:, :] = newton.slope
     for r in range(m):
         for s in range(m):
             entry = stiffness[r, s]
@@ -226,44 +339,118 @@ def static_step(J_star, moved, stiffness, slope, K, torque, sag, work, step):
                 for i in range(n):
                     factor = entry * J_star[r, i]
                     for j in range(n):
-                        work[i, j] -= factor * moved[s, j]
+                        square[i, j] -= factor * newton.J[s, j]
     for i in range(n):
-        work[i, i] += K[i]
-        step[i] = -K[i] * sag[i] - torque[i]
-    for p in range(n):
-        if not work[p, p] > 1e-12 * K[p]:
-            return False
-        for i in range(p + 1, n):
-            factor = work[i, p] / work[p, p]
-            step[i] -= factor * step[p]
-            for j in range(p + 1, n):
-                work[i, j] -= factor * work[p, j]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            step[i] -= work[i, j] * step[j]
-        step[i] /= work[i, i]
+        square[i, i] += springs[i]
+        step[i] = -springs[i] * sag[i] - torque[i]
+    if not eliminate(square, step, _PIVOT, springs):
+        return False
+    for i in range(n):
         sag[i] += step[i]
     return True
 
 
-def warm() -> None:
-    """Compile every kernel of this module."""
-    leave_to_higher(np.zeros((1, 2)), np.zeros((1, 2)), np.array([0, 1]), np.zeros(1), np.zeros(2))
-    J, S, K = np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1)
-    static_step(J, J, S, J, K, np.zeros(1), np.zeros(1), np.zeros((1, 1)), np.zeros(1))
-    nv, c, m = 7, 3, 1
-    (tree, terms), one, row = dynamics.example(nv), np.zeros(1), np.zeros((1, 3), np.int64)
-    mounts = np.ones(1, np.int64), np.eye(3)[None], np.zeros((1, 3)), np.ones((1, nv), np.int64)
-    placed = np.zeros((1, 6, nv)), np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, 6))
-    rows = np.zeros((c, 2), np.int64)
-    rows[:, 1] = np.arange(c)
-    q = np.zeros(8)
-    q[6] = 1.0
-    wide = np.zeros((nv, 1))
-    gravity_slope(tree, terms, wide, np.zeros((nv, nv)), wide.copy(), np.zeros((1, 1)))
-    law(
-        tree, terms, (*mounts, *placed), (rows, row, np.arange(2), placed[1], placed[2], one),
-        (np.eye(m), one, 0, False, 1e-9, True, False), (q, one, np.zeros((nv, 1)), one),
-        (np.zeros((c, nv)), np.zeros((m, nv)), one.copy(), one.copy(), one.copy()),
-        np.zeros(memory_size(nv, 1, c, m)), (nv, 1, c, m),
-    )  # fmt: skip
+@njit(cache=True)
+def _write_error_jacobian(control):
+    """Write minus the errors' Jacobian by joint angles, where the law was last evaluated."""
+    if control.gains.consistent:
+        control.newton.J[:] = control.space.J_star
+    else:
+        multiply(control.at.J_t, control.space.joint_from_base, control.newton.J)
+
+
+@njit(cache=True)
+def static(raw_control, q, theta, sag, iterations, settled, diverged, out):
+    """Evaluate the law at q̄(θ), see `find_static_state`."""
+    control = control_of(raw_control)
+    return find_static_state(control, q, theta, sag, iterations, settled, diverged, out)
+
+
+@njit(cache=True)
+def find_static_state(control, q, theta, sag, iterations, settled, diverged, out):
+    """Evaluate the law at q̄(θ) of Eqs. (15), (16), by Newton's method.
+
+    The springs carry the law there, l(q̄) = K (θ − q̄) = −K sag, so that the last step needs no
+    new evaluation.
+
+    Args:
+        control: the law.
+        q: (nq,) measured configuration.
+        theta: (n,) motor angles, rad.
+        sag: (n,) q̄ − θ, a first guess that is moved.
+        iterations: at most.
+        settled: rad; a smaller step is the last.
+        diverged: rad; a larger step means no solution nearby.
+        out: (n,) torque, Nm, written.
+
+    Returns:
+        EXISTS, SINGULAR_MASS or NO_STATIC_STATE.
+    """
+    gains, at, newton, space = control.gains, control.at, control.newton, control.space
+    joints = np.empty(theta.size)
+    for _ in range(iterations):
+        for i in range(theta.size):
+            joints[i] = theta[i] + sag[i]
+        if not evaluate(control, q, joints, out):
+            return SINGULAR_MASS
+        if gains.fed_back:
+            gravity_slope(control.tree, control.terms, space.joint_from_base, newton)
+        _write_error_jacobian(control)
+        exists = static_step(space.J_star, space.stiffness, gains.springs, out, sag, newton)
+        size = 0.0
+        for i in range(theta.size):
+            size = max(size, abs(newton.step[i]))
+        if not (exists and size < diverged):
+            return NO_STATIC_STATE
+        if size < settled:
+            break
+    for i in range(theta.size):
+        out[i] = -gains.springs[i] * sag[i]
+    for r in range(at.error.size):
+        for i in range(theta.size):
+            at.error[r] -= newton.J[r, i] * newton.step[i]
+    return EXISTS
+
+
+@njit(cache=True)
+def pay(raw_control, raw_reservoir, period, theta, target, out):
+    """Move x̂ over one period and the tank's energy with it, and write the torque at x̂.
+
+    Args:
+        raw_control: the law, evaluated where J* and S are taken.
+        raw_reservoir: `Reservoir`, moved.
+        period: T since the last step, s; at 0 or less u does nothing.
+        theta: (n,) motor angles, rad.
+        target: (m,) x(q̄(θ)), which u moves x̂ to.
+        out: (n,) torque, Nm, written.
+    """
+    control, tank = control_of(raw_control), Reservoir(*raw_reservoir)
+    at, S = control.at, control.space.stiffness
+    m, n = control.space.J_star.shape
+    moved, u = np.zeros(m), np.zeros(m)
+    for r in range(m):
+        for i in range(n):
+            moved[r] += control.space.J_star[r, i] * (theta[i] - tank.theta[i])
+    if period > 0.0:
+        # u of the exact solution of x̂̇ = rate (target − x̂), so that no period is too long.
+        pull = -math.expm1(-tank.rate * period) / period
+        flow = 0.0
+        for r in range(m):
+            u[r] = pull * (target[r] - tank.position[r] - moved[r])
+        for r in range(m):
+            force = 0.0
+            for s in range(m):
+                force += S[r, s] * u[s]
+            flow -= tank.delay_bound * force * (0.5 * period * u[r] + moved[r])
+            if tank.corrected:
+                half = at.wanted[r] - tank.position[r] - 0.5 * (period * u[r] + moved[r])
+                flow += period * force * half
+        if tank.energy[0] + flow >= 0.0:
+            tank.energy[0] += flow
+            for r in range(m):
+                tank.position[r] += period * u[r]
+    tank.theta[:] = theta
+    for r in range(m):
+        tank.position[r] += moved[r]
+        at.error[r] = at.wanted[r] - tank.position[r]
+    _write_torque(control, out)

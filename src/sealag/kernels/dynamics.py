@@ -3,308 +3,371 @@
 A joint may follow another one's coordinate: its rate is then a constant multiple of that one's.
 Everything is in world axes about one point that is at rest in the world and where the first joint
 is now, so that no body needs axes of its own and no precision is lost far from the world's origin.
-Spatial vectors are linear first. Configurations and velocities are laid out as in ``rigid``.
+Spatial vectors are linear first. Configurations and velocities are laid out as in ``spatial``.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from sealag.kernels.spatial import (
+    add,
+    angular,
+    compose,
+    cross,
+    dot,
+    linear,
+    put_rotation,
+    put_twist,
+    put_vector,
+    rotate,
+    rotation,
+    rotation_of,
+    scale,
+    subtract,
+    transpose,
+    vector,
+)
+from sealag.typing import Array, IntArray
+
 GRAVITY = 9.81  # m/s², as in Pinocchio's models
 REVOLUTE, PRISMATIC, FREE = 0, 1, 2
-_INERTIA = 10  # mass, mass times place (3), inertia xx xy xz yy yz zz about the point
+KINETIC, POTENTIAL = 0, 1  # places in Terms.energy
 
 
-def allocate(joint):
-    """Return zeroed terms, as `evaluate` writes them.
+class Tree(NamedTuple):
+    """What a robot is made of: N joints, each with the body behind it.
 
-    Args:
-        joint: as in `evaluate`.
-
-    Returns:
-        Mass matrix M (nv, nv); Coriolis, centrifugal and gravity torques (nv,); the velocity that a
-        coordinate's rate gives to what moves with each of the D degrees of freedom of the tree
-        (D, 6); of every joint its rotation (N, 3, 3),
-        position in the world (N, 3), velocity (N, 6) and, less gravity's, acceleration at zero v̇
-        (N, 6); position, velocity, and acceleration at zero v̇ of the centre of mass (3, 3) and its
-        Jacobian (3, nv); momentum, linear and angular about the centre of mass (6,); kinetic
-        energy and gravity potential (2,).
+    Row 0 is the world; parents come before their children. The tree has D degrees of freedom,
+    followers' included; the robot has nv.
     """
-    count = len(joint)
-    columns = sum(6 if kind == FREE else 1 for kind in joint[1:, 0])
-    nv = columns - int((joint[:, 2] != joint[:, 3]).sum())
-    return (
-        np.zeros((nv, nv)), np.zeros(nv), np.zeros((columns, 6)), np.tile(np.eye(3), (count, 1, 1)),
-        np.zeros((count, 3)), np.zeros((count, 6)), np.zeros((count, 6)), np.zeros((3, 3)),
-        np.zeros((3, nv)), np.zeros(6), np.zeros(2),
+
+    kind: IntArray  # (N,) REVOLUTE, PRISMATIC or FREE
+    parent: IntArray  # (N,) joint
+    column: IntArray  # (N,) its first degree of freedom of the tree
+    coordinate: IntArray  # (N,) its first velocity; another than column if the joint follows
+    rotation: Array  # (N, 3, 3) in the parent joint's axes
+    position: Array  # (N, 3) m, in the parent joint's axes
+    axis: Array  # (N, 3) unit vector in the joint's axes
+    mass: Array  # (N,) kg, of the body
+    lever: Array  # (N, 3) m, its centre of mass in the joint's axes
+    inertia: Array  # (N, 3, 3) kg m², about the centre of mass, in the joint's axes
+    ratio: Array  # (N,) its rate per rate of its coordinate
+    offset: Array  # (N,) its position where its coordinate is 0
+    extra: int  # entries of a configuration less those of a velocity
+
+
+class Terms(NamedTuple):
+    """Rigid-body terms at one configuration and velocity, world axes."""
+
+    M: Array  # (nv, nv) mass matrix
+    nle: Array  # (nv,) Coriolis, centrifugal and gravity torques
+    columns: Array  # (D, 6) twist per rate of each degree of freedom of the tree
+    rotation: Array  # (N, 3, 3) of the joints
+    position: Array  # (N, 3) m, of the joints
+    twist: Array  # (N, 6) velocities of the joints
+    drift: Array  # (N, 6) their accelerations at zero v̇, less gravity's
+    com: Array  # (3,) centre of mass, m
+    com_velocity: Array  # (3,) m/s
+    com_drift: Array  # (3,) its acceleration at zero v̇, m/s²
+    com_jacobian: Array  # (3, nv)
+    momentum: Array  # (6,) linear, then angular about the centre of mass
+    energy: Array  # (2,) KINETIC, POTENTIAL, J
+
+
+class Mounts(NamedTuple):
+    """How F frames are fixed to their joints."""
+
+    joint: IntArray  # (F,)
+    rotation: Array  # (F, 3, 3) in the joint's axes
+    position: Array  # (F, 3) m, in the joint's axes
+    support: IntArray  # (F, D) coordinate that moves it through each degree, plus 1; 0 for none
+
+
+class Frames(NamedTuple):
+    """World-aligned terms of F frames, linear rows first."""
+
+    J: Array  # (F, 6, nv) Jacobians
+    R: Array  # (F, 3, 3) rotations
+    p: Array  # (F, 3) positions, m
+    drift: Array  # (F, 6) classical accelerations at zero v̇, J̇ v
+
+
+class _Bodies(NamedTuple):
+    """What is summed from the leaves inwards, about the common point; row 0 is the whole robot."""
+
+    mass: Array  # (N,) kg
+    moment: Array  # (N, 3) mass times place, kg m
+    inertia: Array  # (N, 3, 3) kg m²
+    force: Array  # (N, 6) that moves it at zero v̇ against gravity
+    momentum: Array  # (N, 6)
+
+
+def allocate(tree: Tree) -> Terms:
+    """Return zeroed terms of a robot."""
+    count, columns = len(tree.kind), sum(6 if kind == FREE else 1 for kind in tree.kind[1:])
+    nv = columns - int((tree.column != tree.coordinate).sum())
+    return Terms(
+        M=np.zeros((nv, nv)), nle=np.zeros(nv), columns=np.zeros((columns, 6)),
+        rotation=np.tile(np.eye(3), (count, 1, 1)), position=np.zeros((count, 3)),
+        twist=np.zeros((count, 6)), drift=np.zeros((count, 6)), com=np.zeros(3),
+        com_velocity=np.zeros(3), com_drift=np.zeros(3), com_jacobian=np.zeros((3, nv)),
+        momentum=np.zeros(6), energy=np.zeros(2),
+    )  # fmt: skip
+
+
+def allocate_frames(count: int, nv: int) -> Frames:
+    """Return zeroed terms of frames."""
+    return Frames(
+        J=np.zeros((count, 6, nv)), R=np.zeros((count, 3, 3)), p=np.zeros((count, 3)),
+        drift=np.zeros((count, 6)),
     )  # fmt: skip
 
 
 @njit(cache=True)
-def evaluate(tree, q, v, terms):
+def evaluate(raw_tree, q, v, raw_terms):
+    """Write the terms of a robot at q (nq,), v (nv,)."""
+    rigid_body_terms(Tree(*raw_tree), q, v, Terms(*raw_terms))
+
+
+@njit(cache=True)
+def rigid_body_terms(tree, q, v, terms):
     """Write the terms of a robot.
 
     Args:
-        tree: what the robot is made of; row 0 is the world, parents come before their children.
-            joint (N, 4) kind, parent, first degree of freedom of the tree and first coordinate,
-            the same unless the joint follows that coordinate; place (N, 12) rotation and position
-            in the parent joint's axes; axis (N, 3) unit vector in the joint's axes; body (N, 13)
-            mass, centre of mass and inertia about it in the joint's axes; gear (N, 2) multiplier
-            and offset of the coordinate; and the entries of a configuration less those of a
-            velocity.
+        tree: the robot.
         q: (nq,) configuration.
         v: (nv,) velocity.
-        terms: as `allocate` returns them, written.
+        terms: written.
     """
-    joint, place, axis, body, gear, shift = tree
-    M, nle, J, R, p, twist, rate, com, com_jacobian, momentum, energy = terms
-    count = joint.shape[0]
-    inertia, force, flow = np.zeros((count, _INERTIA)), np.zeros((count, 6)), np.zeros((count, 6))
-    turn, work, u = np.empty((3, 3)), np.empty((3, 3)), np.empty(6)
-    rate[0, 2] = GRAVITY
-    J[:] = 0.0
+    count = tree.kind.size
+    bodies = _Bodies(
+        np.zeros(count), np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 6)),
+        np.empty((count, 6)),
+    )  # fmt: skip
+    bodies.momentum[0] = 0.0
+    terms.drift[0, 2] = GRAVITY
+    terms.columns[:] = 0.0
     for j in range(1, count):
-        kind, parent, first, at = joint[j, 0], joint[j, 1], joint[j, 2], joint[j, 3]
-        position = gear[j, 0] * q[at + shift] + gear[j, 1]
-        _turn(kind, axis, q, j, position, turn)
-        _place(kind, parent, place, axis, q, j, position, turn, work, R, p)
-        _columns(kind, first, axis, gear[j, 0], R, p, j, J)
-        _move(parent, first, at, 6 if kind == FREE else 1, J, v, j, u, twist, rate)
-        _weigh(body, R, p, j, work, inertia)
-        _times(inertia, twist, j, j, flow)
-        _times(inertia, rate, j, j, force)
-        _add_cross(twist, 3, flow[j], 0, j, force, 0)
-        _add_cross(twist, 3, flow[j], 3, j, force, 3)
-        _add_cross(twist, 0, flow[j], 0, j, force, 3)
-    _gather(joint, inertia, force, flow, J, M, nle, com_jacobian)
-    _whole(inertia, force, flow, p, com, com_jacobian, momentum)
-    energy[0], energy[1] = 0.0, inertia[0, 0] * GRAVITY * com[0, 2]
-    for i in range(v.size):
-        for k in range(v.size):
-            energy[0] += 0.5 * v[i] * M[i, k] * v[k]
+        _place(tree, q, j, terms)
+        _write_columns(tree, j, terms)
+        _move(tree, v, j, terms)
+        _weigh(tree, terms, j, bodies)
+    _gather(tree, bodies, terms)
+    _sum_up(bodies, v, terms)
 
 
 @njit(cache=True)
-def _turn(kind, axis, q, j, position, turn):
-    """Write the rotation (3, 3) of joint j, whose position is an angle, or the base's q[3:7]."""
-    if kind == FREE:
-        x, y, z, w = q[3], q[4], q[5], q[6]
-    else:
-        angle = position if kind == REVOLUTE else 0.0
-        s = math.sin(0.5 * angle)
-        x, y, z, w = s * axis[j, 0], s * axis[j, 1], s * axis[j, 2], math.cos(0.5 * angle)
-    turn[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    turn[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    turn[2, 2] = 1.0 - 2.0 * (x * x + y * y)
-    turn[0, 1], turn[1, 0] = 2.0 * (x * y - w * z), 2.0 * (x * y + w * z)
-    turn[0, 2], turn[2, 0] = 2.0 * (x * z + w * y), 2.0 * (x * z - w * y)
-    turn[1, 2], turn[2, 1] = 2.0 * (y * z - w * x), 2.0 * (y * z + w * x)
-
-
-@njit(cache=True)
-def _place(kind, parent, place, axis, q, j, position, turn, fixed, R, p):
+def _place(tree, q, j, terms):
     """Write rotation and position of joint j."""
-    for a in range(3):
-        p[j, a] = p[parent, a]
-        for b in range(3):
-            p[j, a] += R[parent, a, b] * place[j, 9 + b]
-            fixed[a, b] = 0.0
-            for c in range(3):
-                fixed[a, b] += R[parent, a, c] * place[j, 3 * c + b]
-    for a in range(3):
-        for b in range(3):
-            R[j, a, b] = 0.0
-            if kind == FREE:
-                p[j, a] += fixed[a, b] * q[b]
-            elif kind == PRISMATIC:
-                p[j, a] += fixed[a, b] * axis[j, b] * position
-            for c in range(3):
-                R[j, a, b] += fixed[a, c] * turn[c, b]
+    kind, parent = tree.kind[j], tree.parent[j]
+    R = rotation(terms.rotation, parent)
+    p = add(vector(terms.position, parent), rotate(R, vector(tree.position, j)))
+    R = compose(R, rotation(tree.rotation, j))
+    if kind == FREE:
+        p = add(p, rotate(R, (q[0], q[1], q[2])))
+        R = compose(R, rotation_of(q[3], q[4], q[5], q[6]))
+    else:
+        turned = tree.ratio[j] * q[tree.coordinate[j] + tree.extra] + tree.offset[j]
+        axis = vector(tree.axis, j)
+        if kind == PRISMATIC:
+            p = add(p, rotate(R, scale(turned, axis)))
+        else:
+            x, y, z = scale(math.sin(0.5 * turned), axis)
+            R = compose(R, rotation_of(x, y, z, math.cos(0.5 * turned)))
+    put_rotation(terms.rotation, j, R)
+    put_vector(terms.position, j, p)
 
 
 @njit(cache=True)
-def _columns(kind, first, axis, ratio, R, p, j, J):
-    """Write the columns of joint j's Jacobian, ratio times those of its own rate."""
-    x, y, z = p[j, 0] - p[1, 0], p[j, 1] - p[1, 1], p[j, 2] - p[1, 2]
-    for k in range(3 if kind == FREE else 1):
-        c = first + 3 + k if kind == FREE else first
-        for a in range(3):
-            if kind == FREE:
-                along = R[j, a, k]
-                J[first + k, a] = along
-            else:
-                along = R[j, a, 0] * axis[j, 0] + R[j, a, 1] * axis[j, 1] + R[j, a, 2] * axis[j, 2]
-            J[c, a if kind == PRISMATIC else 3 + a] = ratio * along
-        if kind != PRISMATIC:
-            J[c, 0] = y * J[c, 5] - z * J[c, 4]
-            J[c, 1] = z * J[c, 3] - x * J[c, 5]
-            J[c, 2] = x * J[c, 4] - y * J[c, 3]
+def _write_columns(tree, j, terms):
+    """Write the columns of joint j's Jacobian, world axes, per rate of its coordinate."""
+    kind, first, R = tree.kind[j], tree.column[j], rotation(terms.rotation, j)
+    arm = subtract(vector(terms.position, j), vector(terms.position, 1))
+    none = (0.0, 0.0, 0.0)
+    if kind == FREE:
+        x, y, z = transpose(R)
+        put_twist(terms.columns, first, x, none)
+        put_twist(terms.columns, first + 1, y, none)
+        put_twist(terms.columns, first + 2, z, none)
+        put_twist(terms.columns, first + 3, cross(arm, x), x)
+        put_twist(terms.columns, first + 4, cross(arm, y), y)
+        put_twist(terms.columns, first + 5, cross(arm, z), z)
+        return
+    along = scale(tree.ratio[j], rotate(R, vector(tree.axis, j)))
+    if kind == PRISMATIC:
+        put_twist(terms.columns, first, along, none)
+    else:
+        put_twist(terms.columns, first, cross(arm, along), along)
 
 
 @njit(cache=True)
-def _add_cross(A, at, b, of, j, out, to):
-    """Add to row j of out the cross product of parts of row j of A and of b, each from a place."""
-    x, y, z = A[j, at], A[j, at + 1], A[j, at + 2]
-    out[j, to] += y * b[of + 2] - z * b[of + 1]
-    out[j, to + 1] += z * b[of] - x * b[of + 2]
-    out[j, to + 2] += x * b[of + 1] - y * b[of]
-
-
-@njit(cache=True)
-def _move(parent, first, at, size, J, v, j, own, twist, rate):
+def _move(tree, v, j, terms):
     """Write velocity and acceleration at zero v̇ of joint j."""
-    for k in range(6):
-        own[k] = 0.0
-        for c in range(size):
-            own[k] += J[first + c, k] * v[at + c]
-        twist[j, k] = twist[parent, k] + own[k]
-        rate[j, k] = rate[parent, k]
-    _add_cross(twist, 3, own, 0, j, rate, 0)
-    _add_cross(twist, 0, own, 3, j, rate, 0)
-    _add_cross(twist, 3, own, 3, j, rate, 3)
+    first, at, parent = tree.column[j], tree.coordinate[j], tree.parent[j]
+    own, own_turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for c in range(6 if tree.kind[j] == FREE else 1):
+        rate = v[at + c]
+        own = add(own, scale(rate, linear(terms.columns, first + c)))
+        own_turn = add(own_turn, scale(rate, angular(terms.columns, first + c)))
+    move = add(linear(terms.twist, parent), own)
+    turn = add(angular(terms.twist, parent), own_turn)
+    bend = add(cross(turn, own), cross(move, own_turn))
+    put_twist(terms.twist, j, move, turn)
+    put_twist(
+        terms.drift, j, add(linear(terms.drift, parent), bend),
+        add(angular(terms.drift, parent), cross(turn, own_turn)),
+    )  # fmt: skip
 
 
 @njit(cache=True)
-def _weigh(body, R, p, j, turned, out):
-    """Write the inertia (10,) about the point of body j."""
-    mass = body[j, 0]
-    for a in range(3):
-        c = p[j, a] - p[1, a]
-        for b in range(3):
-            c += R[j, a, b] * body[j, 1 + b]
-            turned[a, b] = 0.0
-            for k in range(3):
-                turned[a, b] += R[j, a, k] * body[j, 4 + 3 * k + b]
-        out[j, 1 + a] = c
-    x, y, z = out[j, 1], out[j, 2], out[j, 3]
-    k = 4
-    for a in range(3):
-        for b in range(a, 3):
-            out[j, k] = -mass * out[j, 1 + a] * out[j, 1 + b]
-            for c in range(3):
-                out[j, k] += turned[a, c] * R[j, b, c]
-            if a == b:
-                out[j, k] += mass * (x * x + y * y + z * z)
-            k += 1
-    out[j, 0], out[j, 1], out[j, 2], out[j, 3] = mass, mass * x, mass * y, mass * z
+def _weigh(tree, terms, j, bodies):
+    """Write body j's mass, moment, inertia, force and momentum about the common point."""
+    mass, R = tree.mass[j], rotation(terms.rotation, j)
+    arm = subtract(vector(terms.position, j), vector(terms.position, 1))
+    c = add(arm, rotate(R, vector(tree.lever, j)))
+    square = mass * dot(c, c)
+    x, y, z = compose(compose(R, rotation(tree.inertia, j)), transpose(R))
+    cx, cy, cz = c
+    ex, ey, ez = (square, 0.0, 0.0), (0.0, square, 0.0), (0.0, 0.0, square)
+    inertia = (
+        add(add(x, ex), scale(-mass * cx, c)), add(add(y, ey), scale(-mass * cy, c)),
+        add(add(z, ez), scale(-mass * cz, c)),
+    )  # fmt: skip
+    bodies.mass[j] = mass
+    put_vector(bodies.moment, j, scale(mass, c))
+    put_rotation(bodies.inertia, j, inertia)
+    move, turn = linear(terms.twist, j), angular(terms.twist, j)
+    push, spin = _momentum(bodies, j, move, turn)
+    force, torque = _momentum(bodies, j, linear(terms.drift, j), angular(terms.drift, j))
+    put_twist(bodies.momentum, j, push, spin)
+    put_twist(
+        bodies.force, j, add(force, cross(turn, push)),
+        add(torque, add(cross(turn, spin), cross(move, push))),
+    )  # fmt: skip
 
 
 @njit(cache=True)
-def _times(I, u, j, c, out):
-    """Write in row j the momentum of inertia j that moves with row c of u."""
-    x, y, z, a, b, g = u[c, 0], u[c, 1], u[c, 2], u[c, 3], u[c, 4], u[c, 5]
-    out[j, 0] = I[j, 0] * x + b * I[j, 3] - g * I[j, 2]
-    out[j, 1] = I[j, 0] * y + g * I[j, 1] - a * I[j, 3]
-    out[j, 2] = I[j, 0] * z + a * I[j, 2] - b * I[j, 1]
-    out[j, 3] = I[j, 4] * a + I[j, 5] * b + I[j, 6] * g + I[j, 2] * z - I[j, 3] * y
-    out[j, 4] = I[j, 5] * a + I[j, 7] * b + I[j, 8] * g + I[j, 3] * x - I[j, 1] * z
-    out[j, 5] = I[j, 6] * a + I[j, 8] * b + I[j, 9] * g + I[j, 1] * y - I[j, 2] * x
+def _momentum(bodies, j, move, turn):
+    """Return linear and angular momentum of what moves behind joint j with a twist."""
+    moment = vector(bodies.moment, j)
+    push = add(scale(bodies.mass[j], move), cross(turn, moment))
+    return push, add(rotate(rotation(bodies.inertia, j), turn), cross(moment, move))
 
 
 @njit(cache=True)
-def _gather(joint, inertia, force, flow, J, M, nle, com_jacobian):
+def _gather(tree, bodies, terms):
     """Write M, nle and the centre of mass's Jacobian times the mass, from the leaves inwards."""
-    push = np.empty((joint.shape[0], 6))
-    M[:], nle[:], com_jacobian[:] = 0.0, 0.0, 0.0
-    for j in range(joint.shape[0] - 1, 0, -1):
-        kind, parent, first, shift = joint[j, 0], joint[j, 1], joint[j, 2], joint[j, 3]
-        shift -= first
-        for c in range(first, first + 6 if kind == FREE else first + 1):
-            _times(inertia, J, j, c, push)
-            for a in range(3):
-                com_jacobian[a, c + shift] += push[j, a]
-            for k in range(6):
-                nle[c + shift] += J[c, k] * force[j, k]
+    M, nle, columns, mass_jacobian = terms.M, terms.nle, terms.columns, terms.com_jacobian
+    M[:], nle[:], mass_jacobian[:] = 0.0, 0.0, 0.0
+    for j in range(tree.kind.size - 1, 0, -1):
+        first, parent = tree.column[j], tree.parent[j]
+        shift = tree.coordinate[j] - first
+        force, torque = linear(bodies.force, j), angular(bodies.force, j)
+        for c in range(first, first + 6 if tree.kind[j] == FREE else first + 1):
+            move, turn = linear(columns, c), angular(columns, c)
+            push, spin = _momentum(bodies, j, move, turn)
+            px, py, pz = push
+            mass_jacobian[0, c + shift] += px
+            mass_jacobian[1, c + shift] += py
+            mass_jacobian[2, c + shift] += pz
+            nle[c + shift] += dot(move, force) + dot(turn, torque)
             i, start, end = j, first, c + 1
             while i > 0:
                 for d in range(start, end):
-                    s = 0.0
-                    for k in range(6):
-                        s += J[d, k] * push[j, k]
-                    of = d + joint[i, 3] - joint[i, 2]
+                    s = dot(linear(columns, d), push) + dot(angular(columns, d), spin)
+                    of = d + tree.coordinate[i] - tree.column[i]
                     M[c + shift, of] += s
                     if d != c:
                         M[of, c + shift] += s
-                i = joint[i, 1]
-                start = joint[i, 2]
-                end = start + 6 if joint[i, 0] == FREE else start + 1
-        for k in range(_INERTIA):
-            inertia[parent, k] += inertia[j, k]
+                i = tree.parent[i]
+                start = tree.column[i]
+                end = start + 6 if tree.kind[i] == FREE else start + 1
+        bodies.mass[parent] += bodies.mass[j]
+        for a in range(3):
+            bodies.moment[parent, a] += bodies.moment[j, a]
+            for b in range(3):
+                bodies.inertia[parent, a, b] += bodies.inertia[j, a, b]
         for k in range(6):
-            force[parent, k] += force[j, k]
-            flow[parent, k] += flow[j, k]
+            bodies.force[parent, k] += bodies.force[j, k]
+            bodies.momentum[parent, k] += bodies.momentum[j, k]
 
 
 @njit(cache=True)
-def _whole(inertia, force, flow, p, com, com_jacobian, momentum):
-    """Write what is said of the whole robot, from inertia, force and momentum of the world."""
-    mass = inertia[0, 0]
-    com_jacobian[:] /= mass
-    momentum[:] = flow[0]
-    x, y, z = inertia[0, 1] / mass, inertia[0, 2] / mass, inertia[0, 3] / mass
-    com[0, 0], com[0, 1], com[0, 2] = p[1, 0] + x, p[1, 1] + y, p[1, 2] + z
-    momentum[3] -= y * momentum[2] - z * momentum[1]
-    momentum[4] -= z * momentum[0] - x * momentum[2]
-    momentum[5] -= x * momentum[1] - y * momentum[0]
-    for a in range(3):
-        com[1, a], com[2, a] = momentum[a] / mass, force[0, a] / mass
-    com[2, 2] -= GRAVITY
+def _sum_up(bodies, v, terms):
+    """Write centre of mass, its Jacobian, momentum and energy of the whole robot."""
+    mass = bodies.mass[0]
+    terms.com_jacobian[:] /= mass
+    away = scale(1.0 / mass, vector(bodies.moment, 0))
+    push, force = linear(bodies.momentum, 0), linear(bodies.force, 0)
+    terms.com[0], terms.com[1], terms.com[2] = add(vector(terms.position, 1), away)
+    spin = subtract(angular(bodies.momentum, 0), cross(away, push))
+    terms.momentum[0], terms.momentum[1], terms.momentum[2] = push
+    terms.momentum[3], terms.momentum[4], terms.momentum[5] = spin
+    fx, fy, fz = scale(1.0 / mass, force)
+    terms.com_velocity[0], terms.com_velocity[1], terms.com_velocity[2] = scale(1.0 / mass, push)
+    terms.com_drift[0], terms.com_drift[1], terms.com_drift[2] = fx, fy, fz - GRAVITY
+    terms.energy[KINETIC], terms.energy[POTENTIAL] = 0.0, mass * GRAVITY * terms.com[2]
+    for i in range(v.size):
+        row = 0.0
+        for k in range(v.size):
+            row += terms.M[i, k] * v[k]
+        terms.energy[KINETIC] += 0.5 * v[i] * row
 
 
 @njit(cache=True)
-def frames(terms, mounts, J, R, p, bias):
-    """Write Jacobian, rotation, position and J̇ v of F frames, world-aligned, linear rows first.
+def frames(raw_terms, raw_mounts, raw_frames):
+    """Write Jacobian, rotation, position and J̇ v of frames."""
+    frame_terms(Terms(*raw_terms), Mounts(*raw_mounts), Frames(*raw_frames))
+
+
+@njit(cache=True)
+def frame_terms(terms, mounts, frames):
+    """Write Jacobian, rotation, position and J̇ v of frames.
 
     Args:
         terms: of the robot.
-        mounts: as `sealag.robot.Robot.frame_mounts`.
-        J: (F, 6, nv), written.
-        R: (F, 3, 3), written.
-        p: (F, 3) m, written.
-        bias: (F, 6) acceleration at zero v̇, written.
+        mounts: how the frames are fixed.
+        frames: written.
     """
-    columns, turned, place, twist, rate = terms[2], terms[3], terms[4], terms[5], terms[6]
-    joint, rotation, position, support = mounts
-    u = np.empty(3)
-    for f in range(joint.size):
-        j = joint[f]
-        for a in range(3):
-            p[f, a] = place[j, a]
-            for b in range(3):
-                p[f, a] += turned[j, a, b] * position[f, b]
-                R[f, a, b] = 0.0
-                for c in range(3):
-                    R[f, a, b] += turned[j, a, c] * rotation[f, c, b]
-        r, s, t = p[f, 0] - place[1, 0], p[f, 1] - place[1, 1], p[f, 2] - place[1, 2]
-        bias[f] = rate[j]
-        x, y, z = rate[j, 3], rate[j, 4], rate[j, 5]
-        bias[f, 0] += y * t - z * s
-        bias[f, 1] += z * r - x * t
-        bias[f, 2] += x * s - y * r - GRAVITY
-        x, y, z = twist[j, 3], twist[j, 4], twist[j, 5]
-        u[0] = twist[j, 0] + y * t - z * s
-        u[1] = twist[j, 1] + z * r - x * t
-        u[2] = twist[j, 2] + x * s - y * r
-        bias[f, 0] += y * u[2] - z * u[1]
-        bias[f, 1] += z * u[0] - x * u[2]
-        bias[f, 2] += x * u[1] - y * u[0]
-        J[f] = 0.0
-        for k in range(columns.shape[0]):
-            if support[f, k] == 0:
+    origin = vector(terms.position, 1)
+    for f in range(mounts.joint.size):
+        j = mounts.joint[f]
+        R = rotation(terms.rotation, j)
+        p = add(vector(terms.position, j), rotate(R, vector(mounts.position, f)))
+        put_vector(frames.p, f, p)
+        put_rotation(frames.R, f, compose(R, rotation(mounts.rotation, f)))
+        arm, turn = subtract(p, origin), angular(terms.twist, j)
+        bend, spin = linear(terms.drift, j), angular(terms.drift, j)
+        speed = add(linear(terms.twist, j), cross(turn, arm))
+        bend = add(add(bend, cross(spin, arm)), cross(turn, speed))
+        put_twist(frames.drift, f, subtract(bend, (0.0, 0.0, GRAVITY)), spin)
+        J = frames.J[f]
+        J[:] = 0.0
+        for k in range(terms.columns.shape[0]):
+            if mounts.support[f, k] == 0:
                 continue
-            c = support[f, k] - 1
-            x, y, z = columns[k, 3], columns[k, 4], columns[k, 5]
-            J[f, 0, c] += columns[k, 0] + y * t - z * s
-            J[f, 1, c] += columns[k, 1] + z * r - x * t
-            J[f, 2, c] += columns[k, 2] + x * s - y * r
-            J[f, 3, c] += x
-            J[f, 4, c] += y
-            J[f, 5, c] += z
+            c = mounts.support[f, k] - 1
+            wx, wy, wz = angular(terms.columns, k)
+            x, y, z = add(linear(terms.columns, k), cross((wx, wy, wz), arm))
+            J[0, c] += x
+            J[1, c] += y
+            J[2, c] += z
+            J[3, c] += wx
+            J[4, c] += wy
+            J[5, c] += wz
 
 
 @njit(cache=True)
-def gravity_gradient(tree, terms, H):
+def gravity_gradient(raw_tree, raw_terms, H):
+    """Write ∂²V/∂q² (nv, nv), see `gravity_hessian`."""
+    gravity_hessian(Tree(*raw_tree), Terms(*raw_terms), H)
+
+
+@njit(cache=True)
+def gravity_hessian(tree, terms, H):
     """Write how the gravity torque changes with the configuration, ∂²V/∂q².
 
     Moving joint d turns everything behind it, as if gravity turned the other way: for c behind d,
@@ -312,58 +375,32 @@ def gravity_gradient(tree, terms, H):
     c at its rate. Among the base's own directions H is the symmetric part of that.
 
     Args:
-        tree: as in `evaluate`.
-        terms: as `evaluate` wrote them.
+        tree: the robot.
+        terms: of it, evaluated.
         H: (nv, nv) Nm/rad, written.
     """
-    joint, body = tree[0], tree[3]
-    J, R, p = terms[2], terms[3], terms[4]
-    weight, moment = np.zeros(joint.shape[0]), np.zeros((joint.shape[0], 3))
+    columns, origin = terms.columns, vector(terms.position, 1)
+    weight, moment = np.zeros(tree.kind.size), np.zeros((tree.kind.size, 3))
     H[:] = 0.0
-    for j in range(joint.shape[0] - 1, 0, -1):
-        kind, parent, first, shift = joint[j, 0], joint[j, 1], joint[j, 2], joint[j, 3]
-        shift -= first
-        weight[j] += GRAVITY * body[j, 0]
-        for a in range(3):
-            c = p[j, a] - p[1, a]
-            for b in range(3):
-                c += R[j, a, b] * body[j, 1 + b]
-            moment[j, a] += GRAVITY * body[j, 0] * c
-        size = 6 if kind == FREE else 1
-        for c in range(first, first + size):
-            x = weight[j] * J[c, 0] + J[c, 4] * moment[j, 2] - J[c, 5] * moment[j, 1]
-            y = weight[j] * J[c, 1] + J[c, 5] * moment[j, 0] - J[c, 3] * moment[j, 2]
+    for j in range(tree.kind.size - 1, 0, -1):
+        parent, first = tree.parent[j], tree.column[j]
+        shift, own = tree.coordinate[j] - first, GRAVITY * tree.mass[j]
+        R = rotation(terms.rotation, j)
+        arm = subtract(add(vector(terms.position, j), rotate(R, vector(tree.lever, j))), origin)
+        weight[j] += own
+        put_vector(moment, j, add(vector(moment, j), scale(own, arm)))
+        for c in range(first, first + (6 if tree.kind[j] == FREE else 1)):
+            x, y, _ = add(
+                scale(weight[j], linear(columns, c)), cross(angular(columns, c), vector(moment, j))
+            )
             i = j
             while i > 0:
-                start, part = joint[i, 2], 0.5 if i == j else 1.0
-                for d in range(start, start + 6 if joint[i, 0] == FREE else start + 1):
-                    of = d + joint[i, 3] - start
-                    value = part * (J[d, 3] * y - J[d, 4] * x)
+                start, part = tree.column[i], 0.5 if i == j else 1.0
+                for d in range(start, start + 6 if tree.kind[i] == FREE else start + 1):
+                    of = d + tree.coordinate[i] - start
+                    value = part * (columns[d, 3] * y - columns[d, 4] * x)
                     H[c + shift, of] += value
                     H[of, c + shift] += value
-                i = joint[i, 1]
+                i = tree.parent[i]
         weight[parent] += weight[j]
-        for a in range(3):
-            moment[parent, a] += moment[j, a]
-
-
-def example(nv):
-    """Return a tree of a free body and nv - 6 joints, and its terms, to compile kernels with."""
-    count = 2 + nv - 6
-    joint, body = np.zeros((count, 4), np.int64), np.zeros((count, 13))
-    joint[1, 0], joint[2:, 1], joint[2:, 2:] = FREE, 1, 6 + np.arange(nv - 6)[:, None]
-    place, axis, gear = np.zeros((count, 12)), np.zeros((count, 3)), np.tile([1.0, 0.0], (count, 1))
-    place[:, [0, 4, 8]], axis[:, 2], body[:, [0, 4, 8, 12]] = 1.0, 1.0, 1.0
-    return (joint, place, axis, body, gear, 1), allocate(joint)
-
-
-def warm() -> None:
-    """Compile every kernel of this module."""
-    tree, terms = example(7)
-    q, v = np.zeros(8), np.zeros(7)
-    q[6] = 1.0
-    evaluate(tree, q, v, terms)
-    gravity_gradient(tree, terms, np.zeros((7, 7)))
-    mounts = (np.ones(1, np.int64), np.eye(3)[None], np.zeros((1, 3)), np.ones((1, 7), np.int64))
-    J, R, p, bias = np.zeros((1, 6, 7)), np.zeros((1, 3, 3)), np.zeros((1, 3)), np.zeros((1, 6))
-    frames(terms, mounts, J, R, p, bias)
+        put_vector(moment, parent, add(vector(moment, parent), vector(moment, j)))

@@ -11,74 +11,124 @@ velocity that it is about to have. The law is continuous; T is the step, and 0 i
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from sealag.kernels.rigid import backward_solve, cholesky, forward_solve
+from sealag.kernels.linalg import backward_solve, cholesky, forward_solve
+from sealag.typing import Array, IntArray
 
-_CONE = 1e-10  # relative accuracy of the friction cone
+SETTLED, INCONSISTENT, UNSOLVABLE = 0, 1, 2  # how `settle` ends
+_CONE = 1e-10
+"""Relative accuracy of the friction cone. Ten times larger shows in the audit's sliding work; ten
+times smaller is lost in the rounding of forces."""
+_TORSION = 1e-10  # Nm: changes of torsional torque that count as none
 _ITERATIONS = 200
 _STALE = 1e-4  # relative width of a bracket that has lost its root to another point's change
+_SINKING = 1e3  # times the compliance: how fast a sole's point may sink beside the others
+
+
+class Surfaces(NamedTuple):
+    """Friction of P contact points on F feet."""
+
+    foot: IntArray  # (P,) number of the point's foot
+    friction: Array  # (P,) Coulomb coefficient
+    ridge: Array  # (P,) relative compliance that shares force between redundant points
+    torsion_damping: Array  # (F,) torque about the normal per rate, Nms/rad
+    torsion_radius: Array  # (F,) largest such torque per normal force, m
+
+
+class Equations(NamedTuple):
+    """Contact equations of P points at one instant, and memory to solve them."""
+
+    L: Array  # (nv, nv) Cholesky factor of the mass matrix
+    rows: Array  # (P, 3, nv) L⁻¹ (C J)ᵀ of the points
+    target: Array  # (P, 3) what the equations ask for besides J v̇
+    free: Array  # (nv,) L⁻¹ times the forces without contacts
+    twist_rows: Array  # (F, nv) L⁻¹ Jᵀ of each foot's turn about its normal
+    spin: Array  # (F,) rate of that turn, rad/s
+    torque: Array  # (F,) friction torque against it, Nm
+    point: IntArray  # (3 P,) whose equation a row of G is
+    axis: IntArray  # (3 P,) and of which axis of its contact frame
+    G: Array  # (3 P, 3 P) compliance of the closed points
+    H: Array  # (3 P, 3 P) the same with what slides yielding
+    factor: Array  # (3 P, 3 P) of H
+    right: Array  # (3 P,)
+    f: Array  # (3 P,) forces of the closed points
+    slope: Array  # (3 P,) their derivative by a point's yielding
+    low: Array  # (P,) bracket of each point's yielding
+    high: Array  # (P,)
 
 
 @njit(cache=True)
-def _assemble(rows, free, target, closed, mu, ridge, owner, G, b):
-    """Write the contact equations G f = b of all closed points; return their number of rows."""
+def allocate_equations(nv, points, feet):
+    """Return memory for the contact equations of points on feet."""
+    size = 3 * points
+    square = np.zeros((3, size, size))
+    G, H, factor = square[0], square[1], square[2]
+    return Equations(
+        np.zeros((nv, nv)), np.zeros((points, 3, nv)), np.zeros((points, 3)), np.zeros(nv),
+        np.zeros((feet, nv)), np.zeros(feet), np.zeros(feet), np.zeros(size, np.int64),
+        np.zeros(size, np.int64), G, H, factor, np.zeros(size), np.zeros(size), np.zeros(size),
+        np.zeros(points), np.zeros(points),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _assemble(eq, x, closed, surfaces):
+    """Write the contact equations G f = right of all closed points; return their number of rows."""
     size = 0
     for i in range(closed.size):
         if closed[i]:
-            for a in range(0 if mu[i] > 0.0 else 2, 3):
-                owner[size, 0], owner[size, 1] = i, a
+            for a in range(0 if surfaces.friction[i] > 0.0 else 2, 3):
+                eq.point[size], eq.axis[size] = i, a
                 size += 1
     largest = 0.0
-    nv = free.size
     for r in range(size):
-        i, a = owner[r]
-        s = target[i, a]
-        for c in range(nv):
-            s += rows[i, a, c] * free[c]
-        b[r] = -s
+        row = eq.rows[eq.point[r], eq.axis[r]]
+        s = eq.target[eq.point[r], eq.axis[r]]
+        for c in range(x.size):
+            s += row[c] * x[c]
+        eq.right[r] = -s
         for k in range(r + 1):
+            other = eq.rows[eq.point[k], eq.axis[k]]
             s = 0.0
-            j, d = owner[k]
-            for c in range(nv):
-                s += rows[i, a, c] * rows[j, d, c]
-            G[r, k] = s
-            G[k, r] = s
-        largest = max(largest, G[r, r])
+            for c in range(x.size):
+                s += row[c] * other[c]
+            eq.G[r, k] = s
+            eq.G[k, r] = s
+        largest = max(largest, eq.G[r, r])
     for r in range(size):
-        G[r, r] += ridge[owner[r, 0]] * largest
+        eq.G[r, r] += surfaces.ridge[eq.point[r]] * largest
     return size
 
 
 @njit(cache=True)
-def _friction(G, b, owner, size, mu, yielding, f):
-    """Solve (G + diag(yielding)) f = b with yielding >= 0 such that every cone holds.
+def _friction(eq, size, mu, yielding):
+    """Solve (G + diag(yielding)) f = right with yielding >= 0 such that every cone holds.
 
     ``yielding`` (P,) is -w / f_t of a sliding point over T, 0 of a sticking one. Newton on
     mu f_n / |f_t| = 1, which is nearly affine in it (as in trust regions).
     """
-    H = np.empty((size, size))
-    L = np.zeros((size, size))
-    slope = np.empty(size)
-    low = np.zeros(mu.size)
-    high = np.full(mu.size, np.inf)
+    f = eq.f[:size]
+    low, high = eq.low, eq.high
+    low[:], high[:] = 0.0, np.inf
     for _ in range(_ITERATIONS):
         for r in range(size):
             for k in range(size):
-                H[r, k] = G[r, k]
-            if owner[r, 1] < 2:
-                H[r, r] += yielding[owner[r, 0]]
-            f[r] = b[r]
-        if not cholesky(H, L):
+                eq.H[r, k] = eq.G[r, k]
+            if eq.axis[r] < 2:
+                eq.H[r, r] += yielding[eq.point[r]]
+            f[r] = eq.right[r]
+        if not cholesky(eq.H[:size, :size], eq.factor):
             return False
-        forward_solve(L, f)
-        backward_solve(L, f)
+        forward_solve(eq.factor, f)
+        backward_solve(eq.factor, f)
         settled = True
         for r in range(2, size):
-            i = owner[r, 0]
-            if owner[r, 1] != 2 or mu[i] == 0.0 or mu[i] == np.inf:
+            i = eq.point[r]
+            if eq.axis[r] != 2 or mu[i] == 0.0 or mu[i] == np.inf:
                 continue
             excess = math.hypot(f[r - 2], f[r - 1]) - mu[i] * f[r]
             if abs(excess) <= _CONE * abs(mu[i] * f[r]) or (excess < 0.0 and yielding[i] == 0.0):
@@ -88,10 +138,10 @@ def _friction(G, b, owner, size, mu, yielding, f):
                 low[i] = yielding[i]
             else:
                 high[i] = yielding[i]
-            guess = _newton(L, f, r, mu[i], yielding[i], slope)
+            guess = _newton(eq, f, r, mu[i], yielding[i])
             if low[i] == 0.0 and guess < 0.0:
                 guess = 0.0
-            yielding[i] = _inside(guess, low[i], high[i], G[r, r])
+            yielding[i] = _inside(guess, low[i], high[i], eq.G[r, r])
             if high[i] - low[i] <= _STALE * high[i]:  # moved by the other points: begin again
                 low[i], high[i] = 0.0, np.inf
         if settled:
@@ -100,15 +150,16 @@ def _friction(G, b, owner, size, mu, yielding, f):
 
 
 @njit(cache=True)
-def _newton(L, f, r, mu, yielding, slope):
+def _newton(eq, f, r, mu, yielding):
     """Newton iterate for mu f_n / |f_t| = 1 of the point whose normal row is r; inf if none."""
     tangent = math.hypot(f[r - 2], f[r - 1])
     if f[r] <= 0.0 or tangent == 0.0:
         return np.inf
+    slope = eq.slope[: f.size]
     slope[:] = 0.0
     slope[r - 2], slope[r - 1] = -f[r - 2], -f[r - 1]
-    forward_solve(L, slope)
-    backward_solve(L, slope)
+    forward_solve(eq.factor, slope)
+    backward_solve(eq.factor, slope)
     along = (f[r - 2] * slope[r - 2] + f[r - 1] * slope[r - 1]) / tangent
     ratio = mu * f[r] / tangent
     rate = (mu * slope[r] - ratio * along) / tangent
@@ -128,79 +179,83 @@ def _inside(guess, low, high, scale):
 
 
 @njit(cache=True)
-def twist_torque(force, closed, foot_of, torsion, spin, torque):
-    """Write -clip(c spin) within the radius times the normal load; return the largest change."""
+def _twist(eq, force, closed, surfaces):
+    """Write -clip(damping spin) within the radius times the normal load; return the change."""
     change = 0.0
-    for f in range(spin.size):
+    for f in range(eq.spin.size):
         load = 0.0
         for i in range(closed.size):
-            if foot_of[i] == f and closed[i] and force[i, 2] > 0.0:
+            if surfaces.foot[i] == f and closed[i] and force[i, 2] > 0.0:
                 load += force[i, 2]
-        limit = torsion[f, 1] * load if load > 0.0 else 0.0
-        new = -min(max(torsion[f, 0] * spin[f], -limit), limit)
-        change = max(change, abs(new - torque[f]))
-        torque[f] = new
+        limit = surfaces.torsion_radius[f] * load if load > 0.0 else 0.0
+        new = -min(max(surfaces.torsion_damping[f] * eq.spin[f], -limit), limit)
+        change = max(change, abs(new - eq.torque[f]))
+        eq.torque[f] = new
     return change
 
 
 @njit(cache=True)
-def solve(
-    L, rows, free, target, closed, mu, ridge, yielding, foot_of, torsion, twist_rows, spin,
-    x, force,
-):  # fmt: skip
+def solve(eq, surfaces, closed, yielding, x, force):
     """Meet the contact conditions of the closed points.
 
-    ``free`` (nv,) is L⁻¹ times the unconstrained right side, ``ridge`` (P,) the relative compliance
-    that shares force between redundant points, ``yielding`` (P,) a first guess that is improved,
-    ``torsion`` (F, 2) friction torque about the normal: per rate, and per normal
-    force. Writes x (nv,) and force (P, 3); returns False if there is no solution.
+    Args:
+        eq: the equations at the instant.
+        surfaces: friction of the points.
+        closed: (P,) whether each is closed.
+        yielding: (P,) a first guess, improved.
+        x: (nv,) accelerations, or velocities of an impact; written.
+        force: (P, 3) forces, or impulses; read as a first guess of the load on torsion, written.
+
+    Returns:
+        False if there is no solution.
     """
-    count = 3 * closed.size
-    G = np.empty((count, count))
-    b = np.empty(count)
-    f = np.empty(count)
-    owner = np.empty((count, 2), np.int64)
-    torque = np.zeros(spin.size)
-    twist_torque(force, closed, foot_of, torsion, spin, torque)
+    eq.torque[:] = 0.0
+    _twist(eq, force, closed, surfaces)
     for _ in range(_ITERATIONS):
-        x[:] = free
-        for k in range(spin.size):
-            if torque[k] != 0.0:
+        x[:] = eq.free
+        for k in range(eq.spin.size):
+            if eq.torque[k] != 0.0:
                 for c in range(x.size):
-                    x[c] += twist_rows[k, c] * torque[k]
-        size = _assemble(rows, x, target, closed, mu, ridge, owner, G, b)
+                    x[c] += eq.twist_rows[k, c] * eq.torque[k]
+        size = _assemble(eq, x, closed, surfaces)
         force[:] = 0.0
-        if size > 0 and not _friction(G, b, owner, size, mu, yielding, f[:size]):
+        if size > 0 and not _friction(eq, size, surfaces.friction, yielding):
             return False
         for r in range(size):
-            i, a = owner[r]
-            force[i, a] = f[r]
+            i, a = eq.point[r], eq.axis[r]
+            force[i, a] = eq.f[r]
             for c in range(x.size):
-                x[c] += rows[i, a, c] * f[r]
-        if twist_torque(force, closed, foot_of, torsion, spin, torque) < 1e-10:
+                x[c] += eq.rows[i, a, c] * eq.f[r]
+        if _twist(eq, force, closed, surfaces) < _TORSION:
             break
-    backward_solve(L, x)
+    backward_solve(eq.L, x)
     return True
 
 
 @njit(cache=True)
-def settle(
-    L, rows, free, target, touching, closed, mu, ridge, yielding, foot_of, torsion, twist_rows,
-    spin, tolerance, x, force,
-):  # fmt: skip
+def settle(eq, surfaces, touching, closed, yielding, tolerance, x, force):
     """Find which touching points are closed, so that none pulls and none sinks in.
 
     Works on accelerations and forces, or on velocities and impulses (plastic impact, without
-    torsion). Starts from ``closed`` and changes the worst point until nothing is violated. Returns
-    0 when settled, 1 if no consistent set was found, 2 if the equations have no solution.
+    torsion). Starts from ``closed`` and changes the worst point until nothing is violated.
+
+    Args:
+        eq: the equations of all touching points.
+        surfaces: friction of the points.
+        touching: (P,) which may be closed.
+        closed: (P,) which are, changed.
+        yielding: (P,) a first guess, improved.
+        tolerance: pull that is allowed, N or Ns.
+        x: (nv,) as in `solve`, written.
+        force: (P, 3) as in `solve`, written.
+
+    Returns:
+        SETTLED, INCONSISTENT if no set of points was found, UNSOLVABLE.
     """
     count = closed.size
     for _ in range(8 * count + 8):
-        if not solve(
-            L, rows, free, target, closed, mu, ridge, yielding, foot_of, torsion, twist_rows, spin,
-            x, force,
-        ):  # fmt: skip
-            return 2
+        if not solve(eq, surfaces, closed, yielding, x, force):
+            return UNSOLVABLE
         worst, which = tolerance, -1
         for i in range(count):
             if touching[i] == 0:
@@ -208,33 +263,23 @@ def settle(
             if closed[i]:
                 bad = -force[i, 2]
             else:  # points of one sole may sink as little as they yield
-                bad = -target[i, 2] - _along(L, rows, i, x) - 1e3 * ridge[i]
+                bad = -eq.target[i, 2] - _along(eq, i, x) - _SINKING * surfaces.ridge[i]
             if bad > worst:
                 worst, which = bad, i
         if which < 0:
-            return 0
+            return SETTLED
         closed[which] = 1 - closed[which]
         yielding[which] = 0.0
-    return 1
+    return INCONSISTENT
 
 
 @njit(cache=True)
-def _along(L, rows, i, x):
+def _along(eq, i, x):
     """Normal component of J x, from rows = L⁻¹ (C J)ᵀ: (Lᵀ x) · rows."""
     s = 0.0
     for c in range(x.size):
         lx = 0.0
         for k in range(c, x.size):
-            lx += L[k, c] * x[k]
-        s += lx * rows[i, 2, c]
+            lx += eq.L[k, c] * x[k]
+        s += lx * eq.rows[i, 2, c]
     return s
-
-
-def warm() -> None:
-    """Compile every kernel with the types used in practice."""
-    nv, closed, one = 2, np.ones(1, np.int64), np.zeros((1, 3))
-    settle(
-        np.eye(nv), np.zeros((1, 3, nv)) + 0.1, np.zeros(nv), one, closed, closed, np.ones(1),
-        np.ones(1), np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 2)), np.zeros((1, nv)),
-        np.zeros(1), 1e-9, np.zeros(nv), one.copy(),
-    )  # fmt: skip

@@ -5,12 +5,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from sealag.kernels.dense import invert_spd, multiply, multiply_transposed, pseudo_inverse_psd
+from sealag.kernels.linalg import (
+    invert_spd,
+    multiply,
+    multiply_transposed,
+    pseudo_inverse,
+    pseudo_inverse_psd,
+)
 from sealag.typing import Array
 
 SYMMETRIC, PUBLISHED, FORCE = 0, 1, 2
-_ROUNDING = 1e-13  # of the trace: what a Cholesky factorisation leaves
-_WORST_CONDITION = 1e4  # up to which A⁺ through G⁻² loses no more than six digits
 
 
 class Space(NamedTuple):
@@ -27,13 +31,39 @@ class Space(NamedTuple):
     gravity: Array  # (n,) compensation torque
     M_inverse: Array  # (nv, nv)
     P: Array  # (nv, nv)
-    square_n: Array  # (8, n, n)
-    square_c: Array  # (7, c, c)
-    square_m: Array  # (5, m, m)
-    wide_c: Array  # (2, c, nv)
+    phi: Array  # (n, n) φ* = U P_1 Uᵀ
+    phi_inverse: Array  # (n, n)
+    phi_copy: Array  # (n, n) scratch
+    scratch_n: Array  # (5, n, n)
+    contact_mobility: Array  # (c, c) J_s M⁻¹ J_sᵀ
+    contact_inertia: Array  # (c, c) its pseudo-inverse
+    scratch_c: Array  # (5, c, c)
+    square_m: Array  # (5, m, m) scratch
+    moved_c: Array  # (c, nv) J_s M⁻¹
+    wide_c: Array  # (c, nv) scratch
     wide_m: Array  # (m, nv)
     tall_n: Array  # (nv, n)
     values: Array  # (max(n, c, m),)
+
+
+class StackedTerms(NamedTuple):
+    """What N operational spaces are made of."""
+
+    M: Array  # (N, nv, nv) mass matrices
+    g: Array  # (N, nv) gravity torques
+    J_s: Array  # (N, c, nv) contact Jacobians
+    J_t: Array  # (N, m, nv) task Jacobians
+
+
+class StackedSpaces(NamedTuple):
+    """Results of `operational_spaces` at N instants."""
+
+    J_star: Array  # (N, m, n)
+    Lambda: Array  # (N, m, m)
+    stiffness: Array  # (N, m, m)
+    along: Array  # (N, nv, n) motions of the whole robot per joint rate
+    gravity: Array  # (N, n)
+    lift: Array  # (N, m, nv) rows of Λ_k J_k P_k
 
 
 @njit(cache=True)
@@ -62,108 +92,28 @@ def divide(memory, nv, n, c, m):
     gravity, memory = memory[:n], memory[n:]
     M_inverse, memory = memory[: nv * nv].reshape(nv, nv), memory[nv * nv :]
     P, memory = memory[: nv * nv].reshape(nv, nv), memory[nv * nv :]
-    square_n, memory = memory[: 8 * n * n].reshape(8, n, n), memory[8 * n * n :]
-    square_c, memory = memory[: 7 * c * c].reshape(7, c, c), memory[7 * c * c :]
+    phi, memory = memory[: n * n].reshape(n, n), memory[n * n :]
+    phi_inverse, memory = memory[: n * n].reshape(n, n), memory[n * n :]
+    phi_copy, memory = memory[: n * n].reshape(n, n), memory[n * n :]
+    scratch_n, memory = memory[: 5 * n * n].reshape(5, n, n), memory[5 * n * n :]
+    contact_mobility, memory = memory[: c * c].reshape(c, c), memory[c * c :]
+    contact_inertia, memory = memory[: c * c].reshape(c, c), memory[c * c :]
+    scratch_c, memory = memory[: 5 * c * c].reshape(5, c, c), memory[5 * c * c :]
     square_m, memory = memory[: 5 * m * m].reshape(5, m, m), memory[5 * m * m :]
-    wide_c, memory = memory[: 2 * c * nv].reshape(2, c, nv), memory[2 * c * nv :]
+    moved_c, memory = memory[: c * nv].reshape(c, nv), memory[c * nv :]
+    wide_c, memory = memory[: c * nv].reshape(c, nv), memory[c * nv :]
     wide_m, memory = memory[: m * nv].reshape(m, nv), memory[m * nv :]
     tall_n, values = memory[: nv * n].reshape(nv, n), memory[nv * n :]
     return Space(
-        J_star, Lambda, stiffness, joint_from_base, lift, gravity, M_inverse, P, square_n, square_c,
-        square_m, wide_c, wide_m, tall_n, values,
+        J_star, Lambda, stiffness, joint_from_base, lift, gravity, M_inverse, P, phi, phi_inverse,
+        phi_copy, scratch_n, contact_mobility, contact_inertia, scratch_c, square_m, moved_c,
+        wide_c, wide_m, tall_n, values,
     )  # fmt: skip
 
 
 def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
-    """Allocate the arrays of one operational space.
-
-    Args:
-        nv: number of velocities.
-        n: number of actuated joints.
-        c: number of contact rows.
-        m: number of task rows.
-    """
+    """Allocate the arrays of one operational space, see `divide`."""
     return divide(np.zeros(memory_size(nv, n, c, m)), nv, n, c, m)
-
-
-@njit(cache=True)
-def _factor(A, L, left):
-    """A = L Lᵀ by Cholesky with pivots, rows of Lᵀ (r, n) in ``L``; r, and the trace of A.
-
-    It ends where what is left of every diagonal entry is rounding.
-    """
-    n = A.shape[0]
-    trace = 0.0
-    for i in range(n):
-        left[i] = A[i, i]
-        trace += A[i, i]
-    for r in range(n):
-        p = 0
-        for i in range(1, n):
-            if left[i] > left[p]:
-                p = i
-        if not left[p] > _ROUNDING * max(trace, 0.0):
-            return r, trace
-        L[r] = A[p]
-        for k in range(r):
-            factor = L[k, p]
-            for i in range(n):
-                L[r, i] -= factor * L[k, i]
-        scale = 1.0 / np.sqrt(left[p])
-        for i in range(n):
-            L[r, i] *= scale
-            left[i] -= L[r, i] * L[r, i]
-        left[p] = 0.0
-    return n, trace
-
-
-@njit(cache=True)
-def invert_low_rank(A, threshold, out, scratch, values):
-    """out = A⁺ of a symmetric positive semidefinite A (n, n), if that is safe without eigenvalues.
-
-    A = L Lᵀ by Cholesky with pivots, L (n, r), and A⁺ = L G⁻² Lᵀ with G = Lᵀ L, whose eigenvalues
-    are those of A that are not 0.
-
-    Args:
-        A: (n, n), kept.
-        threshold: eigenvalues up to this count as zero.
-        out: (n, n), written.
-        scratch: (5, n, n).
-        values: (≥ n,) scratch.
-
-    Returns:
-        The rank; -1 if eigenvalues must decide what it is, because one may lie near the threshold
-        or A is too badly conditioned. It is given only where it is certain: what is left of the
-        trace is rounding, and λ_r ≥ 1 / trace G⁻¹ is above the threshold.
-    """
-    n = A.shape[0]
-    r, trace = _factor(A, scratch[0], values)
-    L, W = scratch[0][:r], scratch[1][:r]
-    G = scratch[2].ravel()[: r * r].reshape(r, r)
-    G_inverse = scratch[3].ravel()[: r * r].reshape(r, r)
-    multiply_transposed(L, L, G)
-    if not invert_spd(G, G_inverse, scratch[4].ravel()[: r * r].reshape(r, r)):
-        return -1
-    weakest = 0.0
-    for i in range(r):
-        weakest += G_inverse[i, i]
-    if weakest * max(threshold, trace / _WORST_CONDITION) >= 1.0:
-        return -1
-    multiply(G_inverse, L, W)
-    out[:, :] = 0.0
-    for k in range(r):
-        for i in range(n):
-            factor = W[k, i]
-            for j in range(n):
-                out[i, j] += factor * W[k, j]
-    return r
-
-
-@njit(cache=True)
-def _pseudo_inverse(A, threshold, out, scratch, values):
-    """out = A⁺; eigenvalues only where `invert_low_rank` gives no answer. A is overwritten."""
-    if invert_low_rank(A, threshold, out, scratch, values) < 0:
-        pseudo_inverse_psd(A, threshold, out, scratch[0], values, scratch[1])
 
 
 @njit(cache=True)
@@ -188,12 +138,12 @@ def _constrain(M, J_s, tolerance, space):
     P[:, :] = space.M_inverse
     if J_s.shape[0] == 0:
         return True
-    X, scratch = space.wide_c[0], space.wide_c[1]
-    A, A_inverse = space.square_c[0], space.square_c[1]
+    X, scratch = space.moved_c, space.wide_c
+    A, A_inverse = space.contact_mobility, space.contact_inertia
     multiply(J_s, P, X)
     multiply_transposed(X, J_s, A)
     threshold = tolerance * np.trace(A)
-    _pseudo_inverse(A, threshold, A_inverse, space.square_c[2:], space.values)
+    pseudo_inverse(A, threshold, A_inverse, space.scratch_c, space.values)
     _subtract_projection(P, X, A_inverse, scratch)
     return True
 
@@ -239,14 +189,14 @@ def operational_space(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space)
     n = space.gravity.shape[0]
     base = nv - n
     P = space.P
-    phi, phi_inverse, work = space.square_n[0], space.square_n[1], space.square_n[7]
+    phi, phi_inverse, work = space.phi, space.phi_inverse, space.phi_copy
     scale = 0.0
     for i in range(n):
         scale += space.M_inverse[base + i, base + i]
         for j in range(n):
             phi[i, j] = P[base + i, base + j]
             work[i, j] = phi[i, j]
-    _pseudo_inverse(work, tolerance * scale, phi_inverse, space.square_n[2:7], space.values)
+    pseudo_inverse(work, tolerance * scale, phi_inverse, space.scratch_n, space.values)
     for i in range(nv):
         for j in range(n):
             space.tall_n[i, j] = P[i, base + j]
@@ -281,7 +231,7 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
     size = last - first
     if size == 0:
         return
-    P, phi_inverse = space.P, space.square_n[1]
+    P, phi_inverse = space.P, space.phi_inverse
     nv, n = space.joint_from_base.shape
     base = nv - n
     X, scratch = space.wide_m[:size], space.lift[first:last]
@@ -303,7 +253,7 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
     _subtract_projection(P, X, Lambda, scratch)
     if star:
         J_phi = X.ravel()[: size * n].reshape(size, n)
-        multiply(space.J_star[first:last], space.square_n[0], J_phi)
+        multiply(space.J_star[first:last], space.phi, J_phi)
         multiply_transposed(J_phi, space.J_star[first:last], H)
         pseudo_inverse_psd(H, threshold, Lambda, root, space.values, vectors)
     K = K_x[first:last, first:last]
@@ -318,30 +268,32 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
 
 
 @njit(cache=True)
-def operational_spaces(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space, out):
+def operational_spaces(raw_terms, K_x, levels, form, star, tolerance, raw_out):
     """`operational_space` at N instants, one after the other.
 
     Args:
-        M: (N, nv, nv); g: (N, nv); J_s: (N, c, nv); J_t: (N, m, nv).
-        K_x: as in `operational_space`, with levels, form, star, tolerance and space.
-        out: J_star (N, m, n), Lambda (N, m, m), stiffness (N, m, m), joint_from_base
-            (N, nv, n), gravity (N, n), lift (N, m, nv), all written.
+        raw_terms: `StackedTerms`.
+        K_x: as in `operational_space`, with levels, form, star and tolerance.
+        raw_out: `StackedSpaces`, written.
 
     Returns:
         The first instant at which M is not positive definite, or -1.
     """
-    J_star, Lambda, stiffness, joint_from_base, gravity, lift = out
-    for k in range(M.shape[0]):
+    terms, out = StackedTerms(*raw_terms), StackedSpaces(*raw_out)
+    nv, n, c, m = terms.M.shape[2], out.J_star.shape[2], terms.J_s.shape[1], terms.J_t.shape[1]
+    space = divide(np.zeros(memory_size(nv, n, c, m)), nv, n, c, m)
+    for k in range(terms.M.shape[0]):
         if not operational_space(
-            M[k], g[k], J_s[k], J_t[k], K_x, levels, form, star, tolerance, space
-        ):
+            terms.M[k], terms.g[k], terms.J_s[k], terms.J_t[k], K_x, levels, form, star, tolerance,
+            space,
+        ):  # fmt: skip
             return k
-        J_star[k] = space.J_star
-        Lambda[k] = space.Lambda
-        stiffness[k] = space.stiffness
-        joint_from_base[k] = space.joint_from_base
-        gravity[k] = space.gravity
-        lift[k] = space.lift
+        out.J_star[k] = space.J_star
+        out.Lambda[k] = space.Lambda
+        out.stiffness[k] = space.stiffness
+        out.along[k] = space.joint_from_base
+        out.gravity[k] = space.gravity
+        out.lift[k] = space.lift
     return -1
 
 
@@ -357,29 +309,3 @@ def task_torque(J_star, stiffness, error, gravity, out):
             force += stiffness[r, s] * error[s]
         for j in range(n):
             out[j] += J_star[r, j] * force
-
-
-def warm() -> None:
-    """Compile every kernel of this module."""
-    space = allocate(2, 1, 1, m=1)
-    operational_spaces(
-        np.eye(2)[None],
-        np.zeros((1, 2)),
-        np.array([[[1.0, 0.5]]]),
-        np.array([[[0.0, 1.0]]]),
-        np.eye(1),
-        np.array([0, 1]),
-        SYMMETRIC,
-        False,
-        1e-10,
-        space,
-        (
-            np.zeros((1, 1, 1)),
-            np.zeros((1, 1, 1)),
-            np.zeros((1, 1, 1)),
-            np.zeros((1, 2, 1)),
-            np.zeros((1, 1)),
-            np.zeros((1, 1, 2)),
-        ),
-    )
-    task_torque(space.J_star, space.stiffness, np.zeros(1), space.gravity, np.zeros(1))

@@ -1,131 +1,436 @@
-"""Plant kernel: the fourth-order Runge-Kutta step of links, motors and contacts."""
+"""Plant kernels: steps of links, motors and contacts, and what passes between two ticks.
+
+Link side: fourth-order Runge-Kutta in exponential coordinates about the step's start. Motor side:
+exact along the link's cubic. `glide` does step after step, with samples, commands, torque feedback
+and the log, until something needs Python: a tick, another load, a change of contact.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from sealag.kernels import motor, rigid
-from sealag.kernels.contact import evaluate, example, motion
+from sealag.kernels import motor, spatial
+from sealag.kernels.contact import (
+    Instant,
+    accelerate,
+    allocate_work,
+    ground_height,
+    measure_gaps,
+    plant_of,
+    smallest_margin,
+    write_measurement,
+)
+from sealag.kernels.dynamics import KINETIC, POTENTIAL, Terms
+from sealag.kernels.ledger import (
+    GRAVITY_STORE,
+    IMPACT,
+    KINETIC_STORE,
+    MOTOR_STORE,
+    SPRING_STORE,
+    Ledger,
+)
+from sealag.kernels.motor import Held, Rotor, Series
+from sealag.typing import Array, IntArray
+
+MARGIN = 1e-9
+"""m and body weights: a contact this close to changing is at its change. Ten times larger shows in
+the energy that an impact takes; ten times smaller asks more of the bisection than a step has."""
+SAME = 1e-9  # of a step: instants this close are one
+LOAD, SAMPLE, TICK, TAKE = range(4)  # kinds of events, in their order at one instant
+WATCH, EVENTS, CLOSE, MOVE, INSIDE = range(5)
+"""What comes next in a run: at a step's beginning watch, let events happen, close the instant
+(torque feedback and log), move; inside a step only events."""
+END, FALLEN, EVENT, STATE, BLOCKED = range(5)  # why `glide` returns
+
+
+class Step(NamedTuple):
+    """Memory for one step."""
+
+    rates: Array  # (4, nv) of the coordinates about the step's start, at the stages
+    accelerations: Array  # (4, nv)
+    powers: Array  # (4, 4)
+    displacement: Array  # (nv,)
+    angle: Array  # (2, n) motor angles half a step and a step ahead
+    speed: Array  # (2, n)
+    gained: Ledger  # works of the step; its stores are not used
+    series: Series
+
+
+class Channels(NamedTuple):
+    """What happens when in a run, and what is on its way."""
+
+    due: Array  # (E,) instants of events, s, increasing
+    kind: IntArray  # (E,) LOAD, SAMPLE, TICK or TAKE
+    tick: IntArray  # (E,) whose sample, or whose command
+    samples: Array  # (R, row) measurements that are on their way, at their tick modulo R
+    commands: Array  # (R, n) commands that are on their way, likewise
+    sent: Array  # (n,) the last command, Nm
+    acting: Array  # (n,) command that the drives obey, Nm
+    acting_tick: IntArray  # (1,) its tick; -1 for the first command
+    torque_known: Array  # (L,) instant of the spring torque that the drives know; empty if now's
+    torque_history: Array  # (H, n) spring torques at the last looks, Nm
+    torque_held: Array  # (n,) the one that they know, Nm
+    storage: Array  # (1,) that the controller states, J
+    tank: Array  # (1,) energy in its tank, J
+    undelayed_work: Array  # (n,) of the command that it would give without delay, J
+
+
+class Periods(NamedTuple):
+    """Lengths of a run."""
+
+    step: float  # of the physics, s
+    steps: int  # how many of them
+    log: int  # steps from one logged instant to the next
+    watch: int  # steps from one look for a fall to the next
+    torque: int  # steps from one look for spring torque to the next
+    torque_period: float  # the same in s
+
+
+class Log(NamedTuple):
+    """Logged instants, one a row."""
+
+    time: Array  # (N,) s
+    tick: IntArray  # (N,) of the command that acts
+    q: Array  # (N, nq)
+    v: Array  # (N, nv)
+    theta: Array  # (N, n)
+    theta_dot: Array  # (N, n)
+    tau_motor: Array  # (N, n)
+    tau_sea: Array  # (N, n)
+    tau_command: Array  # (N, n)
+    tau_osc: Array  # (N, n)
+    contact_force: Array  # (N, P, 3)
+    contact_mode: IntArray  # (N, P) 0 open, 1 sticking, 2 slipping
+    stores: Array  # (N, 4)
+    joint: Array  # (N, 9, n)
+    scalar: Array  # (N, 5)
+    moved: Array  # (N,)
+    storage: Array  # (N,)
+    tank: Array  # (N,)
+    undelayed_work: Array  # (N, n)
+
+
+class Limits(NamedTuple):
+    """When a run has left what it is about."""
+
+    deflection: float  # rad: a spring deflection beyond any physical range
+    speed: float  # rad/s, m/s: a velocity likewise
+    height: float  # m above the ground, of the base; -inf if nothing counts as a fall
+    tilt: float  # cosine of the base's largest tilt
+    up: Array  # (1, 3) where its z axis points at the start
 
 
 @njit(cache=True)
-def memory_size(nv, n):
-    """Return how many numbers `shared` divides."""
-    return 8 * nv + 24 + 4 * n + nv + 8 * n
-
-
-@njit(cache=True)
-def shared(memory, nv, n):
-    """Return the named parts of a step's memory.
-
-    Rates (4, nv), accelerations (4, nv) and powers (4, 6) of the stages, motor angles and speeds
-    half a step and a step ahead (n, 2, 2), a displacement (nv,), and the joints' works (n, 8).
-    """
-    ends = 8 * nv + 24, 8 * nv + 24 + 4 * n, 9 * nv + 24 + 4 * n
-    return (
-        memory[: 4 * nv].reshape(4, nv), memory[4 * nv : 8 * nv].reshape(4, nv),
-        memory[8 * nv : ends[0]].reshape(4, 6), memory[ends[0] : ends[1]].reshape(n, 2, 2),
-        memory[ends[1] : ends[2]], memory[ends[2] :].reshape(n, 8),
+def _allocate_step(nv, gained):
+    n = gained.joint.shape[1]
+    return Step(
+        np.empty((4, nv)), np.empty((4, nv)), np.empty((4, 4)), np.empty(nv), np.empty((2, n)),
+        np.empty((2, n)), gained, motor.allocate_series(),
     )  # fmt: skip
 
 
 @njit(cache=True)
-def advance(
-    tree, terms, around, state, rates, now, stage, following, sizes, memory, motors, step, regular
-):
-    """Do a step in the present contact modes.
+def _predict_motors(plant, now, held, step, memory):
+    """Write motor angles and speeds half a step and a step ahead, the links accelerating evenly."""
+    n, motors = now.theta.size, plant.motors
+    first_q, first_v = now.q.size - n, now.v.size - n
+    for j in range(n):
+        link = motor.Link(now.q[first_q + j], now.v[first_v + j], now.acceleration[first_v + j], 0.0)
+        rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
+        half, whole = motor.predict(motors, j, held, rotor, link, step, memory.series)
+        memory.angle[0, j], memory.speed[0, j] = half.angle, half.speed
+        memory.angle[1, j], memory.speed[1, j] = whole.angle, whole.speed
+
+
+@njit(cache=True)
+def _close(plant, now, held, step, memory, following):
+    """Move the links to the step's end, and the motors along the links' cubic."""
+    n = now.theta.size
+    first_q, first_v = now.q.size - n, now.v.size - n
+    spatial.combine(
+        now.q, now.v, memory.rates, memory.accelerations, step, first_v, following.q, following.v
+    )
+    for j in range(n):
+        q, v = first_q + j, first_v + j
+        link = motor.link_through(now.q[q], now.v[v], following.q[q], following.v[v], step)
+        rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
+        rotor = motor.move(
+            plant.motors, j, held, rotor, link, step, memory.series, memory.gained.joint
+        )
+        following.theta[j], following.theta_dot[j] = rotor.angle, rotor.speed
+        following.tau_motor[j] = rotor.torque
+
+
+@njit(cache=True)
+def _step(plant, work, now, held, step, memory, following):
+    """Do a step in the present contact modes; return whether every instant has a solution."""
+    rates, accelerations, powers = memory.rates, memory.accelerations, memory.powers
+    base = now.v.size - now.theta.size
+    _predict_motors(plant, now, held, step, memory)
+    following.tau_motor[:], following.force[:] = now.tau_motor, now.force
+    rates[0], accelerations[0], powers[0] = now.v, now.acceleration, now.power
+    for k in range(1, 4):
+        spatial.stage(
+            now.q, now.v, rates[k - 1], accelerations[k - 1], step if k == 3 else 0.5 * step, base,
+            memory.displacement, following.q, following.v, rates[k],
+        )  # fmt: skip
+        following.theta[:], following.theta_dot[:] = memory.angle[k // 3], memory.speed[k // 3]
+        if not accelerate(plant, following, work):
+            return False
+        accelerations[k], powers[k] = following.acceleration, following.power
+    for k in range(powers.shape[1]):
+        mean = powers[0, k] + 2.0 * (powers[1, k] + powers[2, k]) + powers[3, k]
+        memory.gained.scalar[k] = step / 6.0 * mean
+    _close(plant, now, held, step, memory, following)
+    return accelerate(plant, following, work)
+
+
+@njit(cache=True)
+def _stores(motors, at, out):
+    """Write kinetic, gravity, spring and motor energy (4,)."""
+    n = at.theta.size
+    out[KINETIC_STORE], out[GRAVITY_STORE] = at.energy[KINETIC], at.energy[POTENTIAL]
+    out[SPRING_STORE] = out[MOTOR_STORE] = 0.0
+    for j in range(n):
+        stretch = at.theta[j] - at.q[at.q.size - n + j]
+        out[SPRING_STORE] += 0.5 * motors.stiffness[j] * stretch * stretch
+        out[MOTOR_STORE] += 0.5 * motors.inertia[j] * at.theta_dot[j] * at.theta_dot[j]
+
+
+@njit(cache=True)
+def _update_stores(motors, at, ledger):
+    """Write the stores of an instant, and add how much has moved between them."""
+    before = ledger.stores.copy()
+    _stores(motors, at, ledger.stores)
+    for k in range(before.size):
+        ledger.moved[0] += abs(ledger.stores[k] - before[k])
+
+
+@njit(cache=True)
+def _accept(motors, following, now, gained, ledger):
+    """Take the step's end for the present instant, and book the step."""
+    ledger.joint[:] += gained.joint
+    for k in range(IMPACT):
+        ledger.scalar[k] += gained.scalar[k]
+    _copy(following, now)
+    _update_stores(motors, now, ledger)
+
+
+@njit(cache=True)
+def _copy(source, target):
+    target.q[:], target.v[:] = source.q, source.v
+    target.theta[:], target.theta_dot[:] = source.theta, source.theta_dot
+    target.tau_motor[:], target.tau_sea[:] = source.tau_motor, source.tau_sea
+    target.acceleration[:], target.force[:] = source.acceleration, source.force
+    target.gap[:], target.position[:] = source.gap, source.position
+    target.velocity[:], target.power[:] = source.velocity, source.power
+    target.energy[:] = source.energy
+
+
+@njit(cache=True)
+def advance(raw_plant, raw_terms, raw_instants, raw_held, step, raw_gained):
+    """Try a step in the present contact modes.
 
     Args:
-        tree: the robot, as `sealag.robot.Robot.tree`.
-        terms: its terms, as ``dynamics.allocate`` returns them; scratch.
-        around: what surrounds the robot, as in ``contact.evaluate``.
-        state: closed and yielding (P,).
-        rates: stabilisation rate 1/s, time in which friction may stop a point s.
-        now: memory of the step's beginning, as in ``contact.parts``, evaluated.
-        stage: memory of the stages; scratch.
-        following: memory of the step's end, written.
-        sizes: as in ``contact.parts``.
-        memory: as in `shared`, written.
-        motors: parameters, whether torque feedback is not delayed (1.0), command (n,) and known
-            spring torque (n,), and the tables over half a step, a step, and of works.
+        raw_plant: the plant.
+        raw_terms: scratch.
+        raw_instants: the step's beginning, evaluated; and its end, written.
+        raw_held: what the drives hold.
         step: s.
-        regular: whether the step is as long as the tables' one; its works are then written.
+        raw_gained: `Ledger` of the step's works, written.
 
     Returns:
         Whether every instant has a solution.
     """
-    q, v, z, acceleration, power = motion(now, sizes)
-    n = z.shape[0]
-    parts = shared(memory, v.size, n)
-    speeds, accelerations, powers, ahead, u, _ = parts
-    _predict_motors(q, v, z, acceleration, motors, step, regular, motion(following, sizes)[2],
-                    ahead)  # fmt: skip
-    there_q, there_v, there_z, there_acceleration, there_power = motion(stage, sizes)
-    speeds[0], accelerations[0], powers[0] = v, acceleration, power
-    for k in range(1, 4):
-        rigid.stage(
-            q, v, speeds[k - 1], accelerations[k - 1], step if k == 3 else 0.5 * step, v.size - n,
-            u, there_q, there_v, speeds[k],
-        )  # fmt: skip
-        for i in range(n):
-            there_z[i, 0], there_z[i, 1] = ahead[i, k // 3, 0], ahead[i, k // 3, 1]
-        if not evaluate(tree, terms, around, state, rates, motors[0], stage, sizes):
-            return False
-        accelerations[k], powers[k] = there_acceleration, there_power
-    _close(q, v, z, motion(following, sizes)[:3], parts, motors, step, regular, regular)
-    return evaluate(tree, terms, around, state, rates, motors[0], following, sizes)
+    plant, work, now, following, gained = _unpack(raw_plant, raw_terms, raw_instants, raw_gained)
+    memory = _allocate_step(now.v.size, gained)
+    return _step(plant, work, now, Held(*raw_held), step, memory, following)
 
 
 @njit(cache=True)
-def book_step(now, following, sizes, memory, motors, step):
-    """Move links and motors to the end of an irregular step once more, and write its works."""
-    q, v, z = motion(now, sizes)[:3]
-    parts = shared(memory, v.size, z.shape[0])
-    _close(q, v, z, motion(following, sizes)[:3], parts, motors, step, False, True)
+def accept(raw_plant, raw_instants, raw_gained, raw_ledger):
+    """Take the end of the step that was tried for the present instant, and book the step."""
+    now, following = raw_instants
+    _accept(
+        plant_of(raw_plant).motors, Instant(*following), Instant(*now), Ledger(*raw_gained),
+        Ledger(*raw_ledger),
+    )  # fmt: skip
 
 
 @njit(cache=True)
-def _predict_motors(q, v, z, acceleration, motors, step, regular, ahead_z, ahead):
-    """Write motor angles and speeds half a step and a step ahead, the links accelerating evenly."""
-    parameters, instant, tau_osc, tau_measured, half, whole, _ = motors
-    n = z.shape[0]
-    first_q, first_v = q.size - n, v.size - n
-    ahead_z[:] = z
-    for i in range(n):
-        ahead_z[i, 3], ahead_z[i, 4] = q[first_q + i], v[first_v + i]
-        ahead_z[i, 5], ahead_z[i, 6] = acceleration[first_v + i], 0.0
-    motor.predict(
-        parameters, instant, tau_osc, tau_measured, ahead_z, step, half, whole, regular, ahead
-    )
+def begin_books(raw_plant, raw_now, raw_ledger):
+    """Open empty books at an instant."""
+    ledger = Ledger(*raw_ledger)
+    ledger.joint[:], ledger.scalar[:], ledger.moved[:] = 0.0, 0.0, 0.0
+    _stores(plant_of(raw_plant).motors, Instant(*raw_now), ledger.stores)
 
 
 @njit(cache=True)
-def _close(q, v, z, end, parts, motors, step, regular, book):
-    """Move the links to the step's end, and the motors along the links' cubic; book if asked to."""
-    parameters, instant, tau_osc, tau_measured, _, whole, forms = motors
-    end_q, end_v, end_z = end
-    n, work = z.shape[0], parts[5]
-    base = v.size - n
-    rigid.combine(q, v, parts[0], parts[1], step, base, end_q, end_v)
-    end_z[:] = z
-    motor.link_cubic(end_z, q[q.size - n :], v[base:], end_q[q.size - n :], end_v[base:], step)
-    work[:] = 0.0
-    if book:
-        motor.add_link_work(end_z, step, work)
-    motor.move(
-        parameters, instant, tau_osc, tau_measured, end_z, step, whole, forms, regular, book, work
-    )
+def book_impact(raw_plant, raw_now, lost, raw_ledger):
+    """Book what an impact took, J, and the stores after it."""
+    ledger = Ledger(*raw_ledger)
+    ledger.scalar[IMPACT] += lost
+    _update_stores(plant_of(raw_plant).motors, Instant(*raw_now), ledger)
 
 
-def warm() -> None:
-    """Compile every kernel with the types used in practice."""
-    tree, terms, around, state, rates, parameters, now, sizes = example()
-    nv, n = 7, 1
-    memory = np.zeros(memory_size(nv, n))
-    shared(memory, nv, n)
-    tables = (np.zeros((n, 4, 9, 9)), np.zeros((n, 4, 9, 9)), np.zeros((n, 4, 5, 9, 9)))
-    motors = (parameters, 1.0, np.zeros(n), np.zeros(n), *tables)
-    stage, following = now.copy(), now.copy()
-    advance(
-        tree, terms, around, state, rates, now, stage, following, sizes, memory, motors, 1e-3, True
-    )
-    book_step(now, following, sizes, memory, motors, 1e-3)
+@njit(cache=True)
+def _lost(plant, now, limits):
+    """Whether the robot has fallen or left any physical range."""
+    n, contacts = now.theta.size, plant.contacts
+    for j in range(n):
+        if not abs(now.theta[j] - now.q[now.q.size - n + j]) < limits.deflection:
+            return True
+    for i in range(now.v.size):
+        if not abs(now.v[i]) < limits.speed:
+            return True
+    if limits.height == -np.inf:
+        return False
+    _, _, z_axis = spatial.transpose(spatial.rotation_of(now.q[3], now.q[4], now.q[5], now.q[6]))
+    height = now.q[2] - ground_height(contacts, now.q[0])
+    return height < limits.height or spatial.dot(z_axis, spatial.vector(limits.up, 0)) < limits.tilt
+
+
+@njit(cache=True)
+def _feed_torque(channels, periods, look, now):
+    """Give the drives the spring torque that reaches their torque feedback now."""
+    history, size = channels.torque_history, channels.torque_history.shape[0]
+    history[look % size] = now.tau_sea
+    place = channels.torque_known[look] / periods.torque_period
+    before = int(place + SAME)
+    part, after = max(0.0, place - before), min(before + 1, look)
+    for j in range(now.tau_sea.size):
+        earlier = history[before % size, j]
+        channels.torque_held[j] = earlier + part * (history[after % size, j] - earlier)
+
+
+@njit(cache=True)
+def _record(plant, channels, now, time, ledger, log, row):
+    """Write a row of the log."""
+    contacts = plant.contacts
+    log.time[row], log.tick[row] = time, channels.acting_tick[0]
+    log.q[row], log.v[row], log.theta[row] = now.q, now.v, now.theta
+    log.theta_dot[row], log.tau_motor[row] = now.theta_dot, now.tau_motor
+    log.tau_sea[row], log.tau_osc[row] = now.tau_sea, channels.acting
+    log.tau_command[row], log.contact_force[row] = channels.sent, now.force
+    log.storage[row], log.tank[row] = channels.storage[0], channels.tank[0]
+    log.undelayed_work[row] = channels.undelayed_work
+    for i in range(contacts.closed.size):
+        slipping = 1 if contacts.yielding[i] > 0.0 else 0
+        log.contact_mode[row, i] = contacts.closed[i] * (1 + slipping)
+    log.stores[row], log.joint[row], log.scalar[row] = ledger.stores, ledger.joint, ledger.scalar
+    log.moved[row] = ledger.moved[0]
+
+
+@njit(cache=True)
+def _happen(plant, channels, now, event):
+    """Let an event happen; False if it needs Python."""
+    tick = channels.tick[event]
+    if channels.kind[event] == SAMPLE:
+        row = channels.samples[tick % channels.samples.shape[0]]
+        write_measurement(now, plant.contacts, channels.due[event], row)
+    elif channels.kind[event] == TAKE:
+        channels.acting[:] = channels.commands[tick % channels.commands.shape[0]]
+        channels.acting_tick[0] = tick
+    else:
+        return False
+    return True
+
+
+@njit(cache=True)
+def _slide(plant, work, now, held, step, memory, following):
+    """Try a step in which no contact changes; False, with all as it was, if one does."""
+    contacts = plant.contacts
+    before = contacts.yielding.copy()
+    if _step(plant, work, now, held, step, memory, following) and np.isfinite(
+        following.energy[KINETIC]
+    ):
+        measure_gaps(contacts, following)
+        smallest, _ = smallest_margin(contacts, following)
+        if smallest >= -MARGIN:
+            return True
+    contacts.yielding[:] = before
+    return False
+
+
+class Cursor(NamedTuple):
+    """Where a run is."""
+
+    time: float  # s
+    step: int  # the physics step that begins, or is under way
+    event: int  # the next event
+    part: int  # WATCH, EVENTS, CLOSE, MOVE or INSIDE
+
+
+@njit(cache=True)
+def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, cursor, said):
+    """Go on with a run until something needs Python.
+
+    Args:
+        raw_plant: the plant.
+        raw_terms: scratch.
+        raw_instants: the present instant, and scratch for the next.
+        raw_ledger: the books.
+        raw_run: `Channels`, `Periods` and `Limits`, and whether torque feedback is not delayed.
+        raw_log: the log.
+        cursor: raw `Cursor`.
+        said: instant at which the controller last stated its storage, s; inf if it states none.
+
+    Returns:
+        END; FALLEN if `Limits` are left; EVENT if an event needs Python, whose part it is to count
+        it; STATE if the controller must state its storage for the log; BLOCKED if a step needs
+        Python. And the raw `Cursor`, that of BLOCKED behind the step.
+    """
+    plant, work, now, following, ledger = _unpack(raw_plant, raw_terms, raw_instants, raw_ledger)
+    raw_channels, raw_periods, raw_limits, instant = raw_run
+    channels, periods, limits = Channels(*raw_channels), Periods(*raw_periods), Limits(*raw_limits)
+    n, log = now.theta.size, Log(*raw_log)
+    gained = Ledger(np.empty((9, n)), np.empty(5), np.empty(4), np.empty(1))
+    memory = _allocate_step(now.v.size, gained)
+    held = Held(channels.acting, channels.torque_held, instant)
+    at, same = Cursor(*cursor), SAME * periods.step
+    time, step, event, part = at.time, at.step, at.event, at.part
+    profiled = plant.contacts.ground_x.size > 0 or plant.contacts.closed.size == 0
+    while True:
+        if part == WATCH:
+            part = EVENTS
+            if step % periods.watch == 0 and (not profiled or _lost(plant, now, limits)):
+                return FALLEN, (time, step, event, part)
+        if part in (EVENTS, INSIDE):
+            while event < channels.due.size and channels.due[event] <= time + same:
+                if not _happen(plant, channels, now, event):
+                    return EVENT, (time, step, event, part)
+                event += 1
+            part = CLOSE if part == EVENTS else MOVE
+        if part == CLOSE:
+            logged = step % periods.log == 0 or step == periods.steps
+            if logged and said != np.inf and said != time:
+                return STATE, (time, step, event, part)
+            if channels.torque_known.size > 0 and step % periods.torque == 0:
+                _feed_torque(channels, periods, step // periods.torque, now)
+            if logged:
+                row = (step + periods.log - 1) // periods.log
+                _record(plant, channels, now, time, ledger, log, row)
+            if step == periods.steps:
+                return END, (time, step, event, part)
+            part = MOVE
+        begin, end = time, (step + 1) * periods.step
+        time, part = end, WATCH
+        if event < channels.due.size and channels.due[event] < end - same:
+            time, part = channels.due[event], INSIDE
+        else:
+            step += 1
+        span = time - begin
+        if abs(span - periods.step) <= same:
+            span = periods.step
+        if not (profiled and _slide(plant, work, now, held, span, memory, following)):
+            return BLOCKED, (time, step, event, part)
+        _accept(plant.motors, following, now, gained, ledger)
+
+
+@njit(cache=True)
+def _unpack(raw_plant, raw_terms, raw_instants, raw_ledger):
+    """Return plant, memory, the present and the following instant, and the books."""
+    plant, (now, following) = plant_of(raw_plant), raw_instants
+    work = allocate_work(plant, Terms(*raw_terms))
+    return plant, work, Instant(*now), Instant(*following), Ledger(*raw_ledger)

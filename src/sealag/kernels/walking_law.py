@@ -60,39 +60,6 @@ def constrain(M_inverse, h, J, b, a_0, P):
 
 
 @njit(cache=True)
-def damped_solve(A, r, damping, x):
-    """Write the least-squares solution x (m,) of A x = r, damped where A is nearly singular.
-
-    Args:
-        A: (m, m).
-        r: (m,).
-        damping: share of the trace of AᵀA that is added to it.
-        x: (m,), written; not a number if A is not finite.
-    """
-    m = A.shape[0]
-    G, L = np.empty((m, m)), np.zeros((m, m))
-    G[:] = 0.0
-    x[:] = 0.0
-    for k in range(m):
-        for i in range(m):
-            a = A[k, i]
-            x[i] += a * r[k]
-            if a != 0.0:
-                for j in range(i + 1):
-                    G[i, j] += a * A[k, j]
-    trace = 0.0
-    for i in range(m):
-        trace += G[i, i]
-    for i in range(m):
-        G[i, i] += damping * trace + 1e-300
-    if not cholesky(G, L):
-        x[:] = np.nan
-        return
-    forward_solve(L, x)
-    backward_solve(L, x)
-
-
-@njit(cache=True)
 def task_torques(a_0, P, J_t, b_t, wanted, damping, tau):
     """Write τ (n,) that gives the tasks the accelerations wanted.
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,9 +11,12 @@ import pinocchio as pin
 from sealag.errors import InputError, UnknownNameError, near
 from sealag.robot._contact import Contact
 from sealag.robot._mimic import Coupling, Follower, couple
-from sealag.robot._tree import Mounts, Tree, frame_mounts, tree_of
+from sealag.robot._tree import frame_mounts, tree_of
 from sealag.robot._workspace import Workspace
 from sealag.typing import Array, ArrayLike, BoolArray
+
+if TYPE_CHECKING:
+    from sealag.kernels.dynamics import Mounts, Tree
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +68,7 @@ class Robot:
     friction: Array
     mass: float
     _model: Any = field(repr=False)
-    tree: Tree = field(init=False, repr=False, compare=False)
+    tree: "Tree" = field(init=False, repr=False, compare=False)
     _coupling: Coupling = field(init=False, repr=False, compare=False)
     _scratch: list[Workspace] = field(default_factory=list, repr=False, compare=False)
 
@@ -299,16 +302,11 @@ class Robot:
             raise near(frame, self.frame_names(), what=f"frame of {self.name}")
         return frame
 
-    def frame_mounts(self, frames: Sequence[str]) -> Mounts:
+    def frame_mounts(self, frames: Sequence[str]) -> "Mounts":
         """Return how frames are fixed to their joints, as compiled kernels take it.
 
         Args:
             frames: F names.
-
-        Returns:
-            Numbers of the joints (F,), rotations (F, 3, 3) and positions (F, 3) in the joints'
-            axes, and (F, D) for each degree of freedom of the tree, followers last, which
-            coordinate moves the frame through it: its number plus one, or 0 for none.
 
         Raises:
             UnknownNameError: a frame does not exist.
@@ -325,7 +323,7 @@ class Robot:
         Raises:
             UnknownNameError: a frame does not exist.
         """
-        return np.isin(np.arange(self.nv_base, self.nv) + 1, self.frame_mounts(frames)[3])
+        return np.isin(np.arange(self.nv_base, self.nv) + 1, self.frame_mounts(frames).support)
 
     def frame_placement(self, frame: str, q: ArrayLike) -> tuple[Array, Array]:
         """Return a frame's rotation (3, 3) and position (3,) in the world.

@@ -1,47 +1,49 @@
 """A robot as compiled kernels take it: its tree of bodies, and how frames are fixed to them."""
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 
 from sealag.robot._mimic import Coupling
-from sealag.typing import Array, IntArray
 
-Tree: TypeAlias = tuple[IntArray, Array, Array, Array, Array, int]
-"""As in `sealag.kernels.dynamics.evaluate`."""
+if TYPE_CHECKING:
+    from sealag.kernels.dynamics import Mounts, Tree
 
-Mounts: TypeAlias = tuple[IntArray, Array, Array, IntArray]
-"""As in `frame_mounts`."""
-
-
-def tree_of(model: Any, coupling: Coupling) -> Tree:
+def tree_of(model: Any, coupling: Coupling) -> "Tree":
     """Return a model's bodies and joints.
 
     Args:
         model: the Pinocchio model, whose joints are revolute, prismatic, or the free base.
         coupling: how they move with the robot's coordinates.
     """
-    from sealag.kernels.dynamics import FREE, PRISMATIC, REVOLUTE
+    from sealag.kernels.dynamics import FREE, PRISMATIC, REVOLUTE, Tree
 
     count, first = model.njoints, _columns(model, coupling)
-    joint, gear = np.zeros((count, 4), np.int64), np.tile([1.0, 0.0], (count, 1))
-    place, axis, body = np.zeros((count, 12)), np.zeros((count, 3)), np.zeros((count, 13))
+    tree = Tree(
+        kind=np.zeros(count, np.int64), parent=np.zeros(count, np.int64),
+        column=np.array(first, np.int64), coordinate=np.zeros(count, np.int64),
+        rotation=np.zeros((count, 3, 3)), position=np.zeros((count, 3)), axis=np.zeros((count, 3)),
+        mass=np.zeros(count), lever=np.zeros((count, 3)), inertia=np.zeros((count, 3, 3)),
+        ratio=np.ones(count), offset=np.zeros(count), extra=model.nq - model.nv,
+    )  # fmt: skip
     for j in range(1, count):
         moved, fixed, inertia = model.joints[j], model.jointPlacements[j], model.inertias[j]
-        kind, coordinate = FREE, 0
+        tree.kind[j], tree.parent[j] = FREE, model.parents[j]
         if moved.nv == 1:
             linear, angular = np.split(np.ravel(moved.createData().S), 2)
-            kind = REVOLUTE if angular.any() else PRISMATIC
-            axis[j] = angular if kind == REVOLUTE else linear
+            turning = angular.any()
+            tree.kind[j] = REVOLUTE if turning else PRISMATIC
+            tree.axis[j] = angular if turning else linear
             coordinate = int(np.flatnonzero(coupling.T[moved.idx_v])[0])
-            gear[j, 0] = coupling.T[moved.idx_v, coordinate]
-            gear[j, 1] = coupling.offset[moved.idx_v - model.nv]
-        joint[j] = kind, model.parents[j], first[j], coordinate
-        place[j, :9], place[j, 9:] = fixed.rotation.ravel(), fixed.translation
-        body[j, 0], body[j, 1:4], body[j, 4:] = inertia.mass, inertia.lever, inertia.inertia.ravel()
-    return joint, place, axis, body, gear, model.nq - model.nv
+            tree.coordinate[j] = coordinate
+            tree.ratio[j] = coupling.T[moved.idx_v, coordinate]
+            tree.offset[j] = coupling.offset[moved.idx_v - model.nv]
+        tree.rotation[j], tree.position[j] = fixed.rotation, fixed.translation
+        tree.mass[j], tree.lever[j] = inertia.mass, inertia.lever
+        tree.inertia[j] = inertia.inertia
+    return tree
 
 
 def _columns(model: Any, coupling: Coupling) -> list[int]:
@@ -63,19 +65,16 @@ def frame_number(model: Any, name: str) -> int:
     return next(k for k, frame in enumerate(model.frames) if frame.name == name)
 
 
-def frame_mounts(model: Any, coupling: Coupling, frames: Sequence[str]) -> Mounts:
+def frame_mounts(model: Any, coupling: Coupling, frames: Sequence[str]) -> "Mounts":
     """Return how frames are fixed to their joints.
 
     Args:
         model: the Pinocchio model.
         coupling: how its joints move with the robot's coordinates.
         frames: F names, which must exist.
-
-    Returns:
-        Numbers of the joints (F,), rotations (F, 3, 3) and positions (F, 3) in the joints' axes,
-        and (F, D) for each degree of freedom of the tree, followers last, which coordinate moves
-        the frame through it: its number plus one, or 0 for none.
     """
+    from sealag.kernels.dynamics import Mounts
+
     count, first = len(frames), _columns(model, coupling)
     joint, support = np.zeros(count, np.int64), np.zeros((count, model.nv), np.int64)
     rotation, position = np.zeros((count, 3, 3)), np.zeros((count, 3))
@@ -88,4 +87,4 @@ def frame_mounts(model: Any, coupling: Coupling, frames: Sequence[str]) -> Mount
             for k in range(moved.nv):
                 coordinate = np.flatnonzero(coupling.T[moved.idx_v + k])[0]
                 support[f, first[number] + k] = coordinate + 1
-    return joint, rotation, position, support
+    return Mounts(joint=joint, rotation=rotation, position=position, support=support)

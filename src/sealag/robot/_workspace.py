@@ -1,14 +1,17 @@
 """Memory for evaluating a robot's terms again and again, as a controller or simulator does."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 
 from sealag.robot._mimic import Coupling
-from sealag.robot._tree import Mounts, Tree, frame_mounts
+from sealag.robot._tree import frame_mounts
 from sealag.typing import Array
+
+if TYPE_CHECKING:
+    from sealag.kernels.dynamics import Frames, Mounts, Tree
 
 
 class Workspace:
@@ -24,10 +27,10 @@ class Workspace:
         com: centre of mass (3,) in the world, m.
         com_velocity: velocity (3,) of the centre of mass in the world, m/s.
         momentum: centroidal momentum (6,): linear, then angular about the centre of mass.
-        terms: what compiled kernels take, as `sealag.kernels.dynamics.allocate` returns it.
+        terms: all of it, as `sealag.kernels.dynamics.Terms`.
     """
 
-    def __init__(self, model: Any, coupling: Coupling, tree: Tree, *, nv_base: int) -> None:
+    def __init__(self, model: Any, coupling: Coupling, tree: "Tree", *, nv_base: int) -> None:
         """Allocate memory for a model.
 
         Args:
@@ -38,18 +41,16 @@ class Workspace:
         """
         from sealag.kernels import dynamics
 
-        self._model, self._tree, self._kernel = model, tree, dynamics
+        self._model, self._raw_tree, self._kernel = model, tuple(tree), dynamics
         self._coupling = coupling
         self._data = model.createData()
         self._frames: dict[str, _Frame] = {}
         self.nv, self.nv_base = coupling.T.shape[1], nv_base
         self._q = coupling.restrict(pin.neutral(model))
-        self.terms = dynamics.allocate(tree[0])
-        self.M: Array = self.terms[0]
-        self.nle: Array = self.terms[1]
-        self._com, self._com_jacobian, self.momentum, self._energy = self.terms[7:]
-        self.com: Array = self._com[0]
-        self.com_velocity: Array = self._com[1]
+        self.terms = dynamics.allocate(tree)
+        self._raw_terms = tuple(self.terms)
+        self.M, self.nle, self.momentum = self.terms.M, self.terms.nle, self.terms.momentum
+        self.com, self.com_velocity = self.terms.com, self.terms.com_velocity
         self._weight = dynamics.GRAVITY * sum(inertia.mass for inertia in model.inertias[1:])
 
     def update(self, q: Array, v: Array) -> None:
@@ -60,31 +61,31 @@ class Workspace:
             v: (nv,) velocity.
         """
         self._q = q
-        self._kernel.evaluate(self._tree, q, v, self.terms)
+        self._kernel.evaluate(self._raw_tree, q, v, self._raw_terms)
 
     @property
     def kinetic_energy(self) -> float:
         """Kinetic energy of the links, J."""
-        return float(self._energy[0])
+        return float(self.terms.energy[self._kernel.KINETIC])
 
     @property
     def potential_energy(self) -> float:
         """Gravity potential, J."""
-        return float(self._energy[1])
+        return float(self.terms.energy[self._kernel.POTENTIAL])
 
     def gravity(self) -> Array:
         """Return the gravity torque (nv,)."""
-        return self._weight * self._com_jacobian[2]
+        return self._weight * self.terms.com_jacobian[2]
 
     def gravity_gradient(self) -> Array:
         """Return ∂g/∂q (nv, nv) as `sealag.robot.Robot.gravity_gradient`; new memory."""
         H = np.empty((self.nv, self.nv))
-        self._kernel.gravity_gradient(self._tree, self.terms, H)
+        self._kernel.gravity_gradient(self._raw_tree, self._raw_terms, H)
         return H
 
     def com_jacobian(self) -> Array:
         """Return the Jacobian (3, nv) of the centre of mass."""
-        return self._com_jacobian
+        return self.terms.com_jacobian
 
     def center_of_mass(self, q: Array) -> Array:
         """Return a copy of the centre of mass (3,) at a configuration, and evaluate nothing else.
@@ -96,7 +97,7 @@ class Workspace:
 
     def com_bias(self) -> Array:
         """Return the acceleration (3,) of the centre of mass at zero joint acceleration."""
-        return self._com[2]
+        return self.terms.com_drift
 
     def centroidal_map(self) -> Array:
         """Return the centroidal momentum matrix (6, nv): linear then angular, world axes."""
@@ -109,7 +110,7 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        found = self._frame(frame)
+        found = self._frame(frame).terms
         return found.R[0], found.p[0]
 
     def frame_jacobian(self, frame: str) -> Array:
@@ -118,7 +119,7 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        return self._frame(frame).J[0]
+        return self._frame(frame).terms.J[0]
 
     def frame_velocity(self, frame: str) -> Array:
         """Return a frame's velocity (6,): linear then angular, axes of the world.
@@ -127,8 +128,8 @@ class Workspace:
             frame: its name, which must exist.
         """
         found = self._frame(frame)
-        twist = self.terms[5][found.mounts[0][0]]
-        arm = found.p[0] - self.terms[4][1]
+        twist = self.terms.twist[found.mounts.joint[0]]
+        arm = found.terms.p[0] - self.terms.position[1]
         return np.concatenate([twist[:3] + np.cross(twist[3:], arm), twist[3:]])
 
     def frame_bias(self, frame: str) -> Array:
@@ -137,7 +138,7 @@ class Workspace:
         Args:
             frame: its name, which must exist.
         """
-        return self._frame(frame).bias[0]
+        return self._frame(frame).terms.drift[0]
 
     def _frame(self, name: str) -> "_Frame":
         """Return what is known of a frame now."""
@@ -145,21 +146,15 @@ class Workspace:
         if found is None:
             found = self._frames[name] = _Frame(
                 mounts=frame_mounts(self._model, self._coupling, [name]),
-                J=np.zeros((1, 6, self.nv)),
-                R=np.zeros((1, 3, 3)),
-                p=np.zeros((1, 3)),
-                bias=np.zeros((1, 6)),
+                terms=self._kernel.allocate_frames(1, self.nv),
             )
-        self._kernel.frames(self.terms, found.mounts, found.J, found.R, found.p, found.bias)
+        self._kernel.frames(self._raw_terms, tuple(found.mounts), tuple(found.terms))
         return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Frame:
-    """How one frame is fixed, and its terms as `sealag.kernels.dynamics.frames` writes them."""
+    """How one frame is fixed, and its terms."""
 
-    mounts: Mounts
-    J: Array
-    R: Array
-    p: Array
-    bias: Array
+    mounts: "Mounts"
+    terms: "Frames"

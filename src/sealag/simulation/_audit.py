@@ -23,7 +23,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sealag.simulation._ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES, residual
+from sealag.kernels.ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
+from sealag.simulation._ledger import residual
 from sealag.typing import Array
 
 _STILL = 1e-6

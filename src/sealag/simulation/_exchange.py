@@ -8,7 +8,6 @@ import numpy as np
 from sealag.simulation._network import Clock, Network
 from sealag.typing import Array, IntArray
 
-SAME = 1e-9  # of a step: instants this close are one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -37,6 +37,31 @@ class FlatGround:
     def height(self, x: float, y: float) -> float:
         """Return the level (m), whatever ``x`` and ``y`` (m)."""
         return self.level
+
+    def profile(self) -> tuple[Array, Array]:
+        """Return one place and its height, m."""
+        return np.zeros(1), np.array([self.level])
+
+
+@runtime_checkable
+class ProfiledGround(Protocol):
+    """A ground whose height varies along x only: the simulator then asks it nothing in a step."""
+
+    def profile(self) -> tuple[Array, Array]:
+        """Return increasing places x (G,) and the heights (G,) there, m.
+
+        Between them the ground is linear, beyond them level.
+        """
+        ...
+
+
+def ground_profile(ground: Ground) -> tuple[Array, Array] | None:
+    """Return a ground's profile; None if it has none.
+
+    Args:
+        ground: The terrain.
+    """
+    return ground.profile() if isinstance(ground, ProfiledGround) else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,14 +10,13 @@ from sealag.actuation import Actuators
 from sealag.errors import InputError, SealagError, SolverError
 from sealag.robot import Robot
 from sealag.simulation._audit import Stated, UndelayedWork, audit
-from sealag.simulation._exchange import SAME, Exchanges
-from sealag.simulation._ledger import JOINT_FLOWS, ledger_sizes
+from sealag.simulation._exchange import Exchanges
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.simulation._plant import FASTEST, Plant
-from sealag.simulation._run import Log, Run
+from sealag.simulation._run import Run, refuse_large
 from sealag.simulation._scene import Scene
-from sealag.typing import Array
+from sealag.typing import Array, IntArray
 from sealag.whole_body import (
     Measurement,
     StoringController,
@@ -25,10 +24,16 @@ from sealag.whole_body import (
     TickController,
 )
 
+if TYPE_CHECKING:
+    from sealag.kernels.plant import Channels, Limits, Log
+
 _WATCH = 5e-3  # s between two looks for a fall
 _AT_REST = 1e-12  # rad: how far the first motor angles may be from rest
 _ROUNDS = 50
-_SCALARS = ("time", "measurement_age", "command_age", "storage", "tank")
+_LOGGED = (
+    "time", "q", "v", "theta", "theta_dot", "tau_sea", "tau_motor", "tau_command", "tau_osc",
+    "contact_mode", "contact_force",
+)  # fmt: skip
 _LONGEST = 100.0  # rad: a spring deflection beyond any physical range
 _BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError)  # arithmetic that has no answer
 _MAY_BE_NUMERICAL = (Outcome.DIVERGED, Outcome.CONTACT_UNSOLVABLE, Outcome.CHATTERED)
@@ -109,9 +114,11 @@ class _Loop:
         scene: Scene,
         seed: int,
     ) -> None:
+        from sealag.kernels import plant
+
         frames = list(dict.fromkeys(push.frame for push in scene.pushes))
         self.robot, self.controller, self.clock, self.scene = robot, controller, clock, scene
-        self.seed, self._network = seed, network
+        self.seed, self._network, self._kernel = seed, network, plant
         self.plant = Plant(
             robot,
             actuators,
@@ -123,18 +130,12 @@ class _Loop:
             stabilisation=scene.stabilisation,
         )
         n, feet = robot.n, len(scene.feet)
-        self._watch_steps = max(1, round(_WATCH / clock.physics))
         allocate = {"nq": robot.nq, "nv": robot.nv, "n": n, "contacts": feet}
         self.truth, self.received = (Measurement.allocate(**allocate) for _ in range(2))
-        self._sampled: dict[int, Array] = {}
-        self._commands: dict[int, Array] = {}
-        self._known, self._sent, self._acting = 0.0, 0.0, 0.0
-        self.acting, self._torque_held = np.zeros(n), np.zeros(n)
         self._storing = controller if isinstance(controller, StoringController) else None
         self._tank = controller if isinstance(controller, TankController) else None
-        self._given, self._said = UndelayedWork(n), (-1.0, 0.0)
+        self._given, self._said = UndelayedWork(n), math.inf if self._storing is None else -1.0
         self._frames = frames
-        self._fall_height, self._upright = -np.inf, (0.0, 0.0, 1.0)
 
     # Start -------------------------------------------------------------------------------------
     def prepare(self, q: Array, v: Array, theta: Array | None, theta_dot: Array | None) -> None:
@@ -161,9 +162,7 @@ class _Loop:
             answer(np.asarray(theta, dtype=float))
         self.plant.sense(0.0, truth.data)
         self._ask(self.controller.reset, 0.0, truth)
-        self.command = first
-        self.acting[:] = first
-        self._fall_reference()
+        self.first, self._limits = first, self._fall_limits()
 
     def _rest(self, answer: Callable[[Array], Array], guess: Array) -> Array:
         """Motor angles at which the springs carry the command that these angles call forth."""
@@ -184,14 +183,92 @@ class _Loop:
             )
         return answer(found.x)
 
-    def _fall_reference(self) -> None:
-        if self.robot.nv_base == 6 and self.scene.fall is not None:
-            height = self._base_height()
-            self._fall_height = self.scene.fall.height_fraction * height
-            self._upright = _vertical(self.plant.q)
+    # Plan --------------------------------------------------------------------------------------
+    def _plan(self, steps: int, every: int) -> None:
+        """Lay out all that happens: loads, samples, ticks and takings, and what is logged."""
+        kernel, step = self._kernel, self.clock.physics
+        ways = Exchanges.plan(
+            self._network, self.clock, duration=steps * step, seed=self.seed
+        )  # fmt: skip
+        self.exchanges = ways
+        edges = [t for push in self.scene.pushes for t in (push.start, push.start + push.duration)]
+        edges = np.unique(edges)
+        numbers = np.arange(len(ways.tick))
+        parts = (
+            (edges, kernel.LOAD, np.zeros(len(edges))), (ways.seen, kernel.SAMPLE, numbers),
+            (ways.tick, kernel.TICK, numbers), (ways.taken, kernel.TAKE, ways.command),
+        )  # fmt: skip
+        time = np.concatenate([at for at, _, _ in parts])
+        kind = np.concatenate([np.full(len(at), kind) for at, kind, _ in parts]).astype(np.int64)
+        tick = np.concatenate([number for _, _, number in parts]).astype(np.int64)
+        order = np.lexsort((kind, time))
+        self._periods = kernel.Periods(
+            step=step,
+            steps=steps,
+            log=every,
+            watch=max(1, round(_WATCH / step)),
+            torque=self.clock.steps_of("embedded", self.clock.embedded or step),
+            torque_period=self.clock.embedded or step,
+        )
+        self._channels = self._open(time[order], kind[order], tick[order])
+        self._log = self._allocate(-(-steps // every) + 1)
+
+    def _open(self, due: Array, kind: IntArray, tick: IntArray) -> "Channels":
+        """Allocate what is on its way, as much as there ever is at once."""
+        ways, n = self.exchanges, self.robot.n
+        # How many ticks a command may lie before the drives take it, and a sample before a tick.
+        issued = np.searchsorted(ways.tick, ways.taken, "right")
+        depth = int((issued - ways.command).max(initial=0)) + 1
+        first = np.minimum.accumulate(ways.seen[::-1])[::-1]
+        waiting = np.searchsorted(first, ways.tick, "right") - np.arange(len(ways.tick))
+        known, late = np.zeros(0) if ways.torque is None else ways.torque, 0.0
+        if len(known):
+            period = self._periods.torque_period
+            late = float((period * np.arange(len(known)) - known).max() / period)
+        return self._kernel.Channels(
+            due=due,
+            kind=kind,
+            tick=tick,
+            samples=np.zeros((int(waiting.max(initial=0)) + 1, self.truth.data.size)),
+            commands=np.zeros((depth, n)),
+            sent=self.first.copy(),
+            acting=self.first.copy(),
+            acting_tick=np.full(1, -1),
+            torque_known=known,
+            torque_history=np.tile(self.plant.now.tau_sea, (math.ceil(late) + 2, 1)),
+            torque_held=np.zeros(n),
+            storage=np.zeros(1),
+            tank=np.zeros(1),
+            undelayed_work=self._given.work,
+        )
+
+    def _allocate(self, rows: int) -> "Log":
+        robot, plant = self.robot, self.plant
+        n, points, ledger = robot.n, plant.surroundings.count, plant.ledger
+        shapes = {
+            "time": (), "tick": (), "q": (robot.nq,), "v": (robot.nv,), "contact_force": (points, 3),
+            "contact_mode": (points,), "stores": ledger.stores.shape, "joint": ledger.joint.shape,
+            "scalar": ledger.scalar.shape, "moved": (), "storage": (), "tank": (),
+        }  # fmt: skip
+        log = {name: shapes.get(name, (n,)) for name in self._kernel.Log._fields}
+        refuse_large(rows, sum(math.prod(shape) for shape in log.values()))
+        whole = ("tick", "contact_mode")
+        arrays = {
+            name: np.zeros((rows, *shape), np.int64 if name in whole else float)
+            for name, shape in log.items()
+        }
+        arrays["time"][:] = np.nan
+        return self._kernel.Log(**arrays)
+
+    def _fall_limits(self) -> "Limits":
+        fall, height, tilt, up = self.scene.fall, -math.inf, -math.inf, np.zeros((1, 3))
+        if self.robot.nv_base == 6 and fall is not None:
+            height, tilt = fall.height_fraction * self._base_height(), math.cos(fall.tilt)
+            up[0] = _vertical(self.plant.now.q)
+        return self._kernel.Limits(_LONGEST, FASTEST, height, tilt, up)
 
     def _base_height(self) -> float:
-        x, y, z = self.plant.q[:3].tolist()
+        x, y, z = self.plant.now.q[:3].tolist()
         return z - self.scene.ground.height(x, y)
 
     # Motion ------------------------------------------------------------------------------------
@@ -206,21 +283,10 @@ class _Loop:
             raise InputError(
                 f"the duration {duration} s is shorter than a step of {self.clock.physics} s"
             )
-        every = self.clock.steps_of("log", log_period)
-        log = self._allocate(steps // every + 2)
-        self._plan(steps * self.clock.physics)
+        self._plan(steps, self.clock.steps_of("log", log_period))
         outcome, message = Outcome.COMPLETED, ""
-        shown = max(1, round(0.1 / self.clock.physics))
         try:
-            for i in range(steps):
-                self._begin(i)
-                if i % every == 0:
-                    self._record(log)
-                self._move(i)
-                if progress is not None and i % shown == 0:
-                    progress(self.plant.time)
-            self._begin(steps)
-            self._record(log)
+            self._glide(progress)
         except PlantStop as stop:
             outcome, message = stop.outcome, stop.message
             if outcome in _MAY_BE_NUMERICAL:
@@ -233,56 +299,49 @@ class _Loop:
             message = f"the motion cannot be computed after t = {self.plant.time:.4f} s: {error}"
         except KeyboardInterrupt:
             outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
-        if not log.filled:
-            self._record(log)
-        return self._result(log, outcome, message)
+        if not self._filled():
+            self._glide_for(0)
+        return self._result(outcome, message)
 
-    def _plan(self, duration: float) -> None:
-        """Lay out all that happens between the steps: loads, samples, ticks and takings."""
-        ways = Exchanges.plan(self._network, self.clock, duration=duration, seed=self.seed)
-        self.exchanges = ways
-        edges = [t for push in self.scene.pushes for t in (push.start, push.start + push.duration)]
-        times = (np.unique(edges), ways.seen, ways.tick, ways.taken)
-        kinds = np.repeat(np.arange(4), [len(t) for t in times])
-        time = np.concatenate(times)
-        order = np.lexsort((kinds, time))
-        number = np.concatenate([np.arange(len(t)) for t in times])
-        self._due, self._kind, self._number = time[order], kinds[order], number[order]
-        self._next = 0
-        self._happen_by = (self._load, self._sample, self._tick, self._take)
-        # How many ticks a command may lie before the drives take it.
-        issued = np.searchsorted(ways.tick, ways.taken, "right")
-        self._depth = int((issued - ways.command).max(initial=0)) + 1
-        if ways.torque is not None:
-            period = self.clock.embedded or self.clock.physics
-            self._torque_steps = self.clock.steps_of("embedded", period)
-            late = int(np.ceil((period * np.arange(len(ways.torque)) - ways.torque).max() / period))
-            self._history = np.tile(self.plant.tau_sea, (late + 2, 1))
+    def _filled(self) -> int:
+        """How many instants are logged."""
+        return int(np.isfinite(self._log.time).sum())
 
-    def _begin(self, i: int) -> None:
-        """Let happen what is due at the beginning of physics step i."""
-        if i % self._watch_steps == 0:
-            self._watch()
-        self._happen(i * self.clock.physics)
-        if self.exchanges.torque is not None and i % self._torque_steps == 0:
-            self._feed_torque(i // self._torque_steps)
+    def _glide(self, progress: Callable[[float], None] | None) -> None:
+        """Go on from one thing that needs Python to the next, until the end."""
+        kernel, plant, channels = self._kernel, self.plant, self._channels
+        named = (channels, self._periods, self._limits)
+        run, log = (*map(tuple, named), plant.instant_feedback), tuple(self._log)
+        cursor = (0.0, 0, 0, kernel.WATCH)
+        shown, every = 0, max(1, round(0.1 / self.clock.physics))
+        while True:
+            why, cursor = kernel.glide(
+                plant.raw, plant.raw_terms, plant.raw_instants, plant.raw_ledger, run, log, cursor,
+                self._said,
+            )  # fmt: skip
+            time, step, event, part = cursor
+            if why != kernel.BLOCKED:
+                plant.time = time
+            if progress is not None and step >= shown:
+                progress(plant.time)
+                shown = step - step % every + every
+            if why == kernel.END:
+                return
+            if why == kernel.FALLEN:
+                self._watch()
+            elif why == kernel.STATE:
+                self._state()
+            elif why == kernel.BLOCKED:
+                plant.advance(time, channels.acting, channels.torque_held)
+            else:
+                self._happen(event)
+                cursor = (time, step, event + 1, part)
 
-    def _move(self, i: int) -> None:
-        """Move the plant over physics step i, stopping wherever something is due inside it."""
-        end = (i + 1) * self.clock.physics
-        last = end - SAME * self.clock.physics
-        while self._next < len(self._due) and self._due[self._next] < last:
-            instant = float(self._due[self._next])
-            self.plant.advance(instant, self.acting, self._torque_held)
-            self._happen(instant)
-        self.plant.advance(end, self.acting, self._torque_held)
-
-    def _happen(self, instant: float) -> None:
-        last = instant + SAME * self.clock.physics
-        while self._next < len(self._due) and self._due[self._next] <= last:
-            kind, number = self._kind[self._next], int(self._number[self._next])
-            self._next += 1
-            self._happen_by[kind](number)
+    def _happen(self, event: int) -> None:
+        if self._channels.kind[event] == self._kernel.TICK:
+            self._tick(int(self._channels.tick[event]))
+        else:
+            self._load()
 
     @staticmethod
     def _ask(question: Callable[..., Any], *arguments: Any) -> Any:
@@ -294,155 +353,107 @@ class _Loop:
         except _BREAKDOWN as error:
             raise SolverError(f"the controller cannot be evaluated: {error}") from error
 
-    def _load(self, _: int) -> None:
+    def _load(self) -> None:
         """Let the pushes act that act from now on."""
-        now = self.plant.time + SAME * self.clock.physics
+        now = self.plant.time + self._kernel.SAME * self.clock.physics
         load = np.zeros((len(self._frames), 3))
         for push in self.scene.pushes:
             if push.start <= now < push.start + push.duration:
                 load[self._frames.index(push.frame)] += push.force
         self.plant.push(load)
 
-    def _sample(self, tick: int) -> None:
-        """Measure what the controller will know at a tick."""
-        self.plant.sense(float(self.exchanges.seen[tick]), self.truth.data)
-        self._sampled[tick] = self.truth.data.copy()
-
     def _tick(self, tick: int) -> None:
-        t = float(self.exchanges.tick[tick])
-        self.received.data[:] = self._sampled.pop(tick)
-        self.command = np.zeros(self.robot.n)
-        self._ask(self.controller.tick, t, self.received, self.command)
-        if not np.isfinite(self.command).all():
+        channels, t = self._channels, float(self.exchanges.tick[tick])
+        self.received.data[:] = channels.samples[tick % len(channels.samples)]
+        command = channels.commands[tick % len(channels.commands)]
+        command[:] = 0.0
+        self._ask(self.controller.tick, t, self.received, command)
+        if not np.isfinite(command).all():
             raise PlantStop(
                 Outcome.CONTROLLER_FAILED, f"the command at t = {t:.4f} s is not finite"
             )
-        self._known, self._sent = self.received.data[0], t
-        self._commands[tick] = self.command
-        self._commands.pop(tick - self._depth, None)
-        self._state_work(self.plant.time)
+        channels.sent[:] = command
+        self._state()
 
-    def _take(self, taking: int) -> None:
-        """Let the drives obey another command."""
-        tick = int(self.exchanges.command[taking])
-        self.acting[:] = self._commands[tick]
-        self._acting = float(self.exchanges.tick[tick])
-
-    def _feed_torque(self, look: int) -> None:
-        """Give the drives the spring torque that reaches their torque feedback now."""
-        assert self.exchanges.torque is not None
-        period, size = self.clock.embedded or self.clock.physics, len(self._history)
-        self._history[look % size] = self.plant.tau_sea
-        place = float(self.exchanges.torque[look]) / period
-        before = int(place + 1e-9)
-        part, after = max(0.0, place - before), min(before + 1, look)
-        earlier, later = self._history[before % size], self._history[after % size]
-        self._torque_held[:] = earlier + part * (later - earlier)
-
-    def _state_work(self, t: float) -> float:
-        """Let the controller state its undelayed command and its potential; return the latter."""
-        if self._storing is None or t == self._said[0]:
-            return self._said[1]
-        self.plant.sense(t, self.truth.data)
-        storage = self._ask(self._storing.storage, t, self.truth, self._given.command)
-        self._given.move(self.plant.theta)
-        self._said = t, storage
-        return storage
+    def _state(self) -> None:
+        """Let the controller state its undelayed command and its potential."""
+        time, channels = self.plant.time, self._channels
+        if self._storing is not None and time != self._said:
+            self.plant.sense(time, self.truth.data)
+            channels.storage[0] = self._ask(
+                self._storing.storage, time, self.truth, self._given.command
+            )
+            self._given.move(self.plant.now.theta)
+            self._said = time
+        if self._tank is not None:
+            channels.tank[0] = self._tank.tank_energy
 
     def _watch(self) -> None:
         """End the run when the robot has fallen or left any physical range."""
-        plant = self.plant
-        joints = plant.q[-self.robot.n :].tolist()
-        tame = all(abs(a - b) < _LONGEST for a, b in zip(plant.theta.tolist(), joints))
-        if not (tame and all(abs(speed) < FASTEST for speed in plant.v.tolist())):
+        plant, now = self.plant, self.plant.now
+        deflection = np.abs(now.theta - now.q[-self.robot.n :])
+        if not ((deflection < _LONGEST).all() and (np.abs(now.v) < FASTEST).all()):
             raise PlantStop(
                 Outcome.DIVERGED,
                 f"velocities or spring deflections left any physical range at t = "
                 f"{plant.time:.4f} s",
             )
-        if self._fall_height > -np.inf and self.scene.fall is not None:
-            height = self._base_height()
-            along = sum(a * b for a, b in zip(_vertical(plant.q), self._upright))
-            tilt = math.acos(min(1.0, along))
-            if height < self._fall_height or tilt > self.scene.fall.tilt:
+        limits = self._limits
+        if limits.height > -np.inf:
+            height, along = self._base_height(), float(_vertical(now.q) @ limits.up[0])
+            if height < limits.height or along < limits.tilt:
+                tilt = math.acos(min(1.0, along))
                 raise PlantStop(
                     Outcome.FELL,
                     f"the base is {height:.2f} m above the ground and tilted by {tilt:.2f} rad at "
                     f"t = {plant.time:.3f} s",
                 )
 
-    # Storage -----------------------------------------------------------------------------------
-    def _allocate(self, rows: int) -> Log:
-        n, plant = self.robot.n, self.plant
-        widths = {"scalars": len(_SCALARS), "instant": plant.instant.row.size}
-        widths |= {"tau_command": n, "tau_osc": n, "given": n}
-        widths |= dict.fromkeys(("closed", "yielding"), plant.contacts.count)
-        return Log(rows, widths | {"ledger": plant.ledger.data.size})
-
-    def _record(self, log: Log) -> None:
-        plant, t = self.plant, self.plant.time
-        storage = self._state_work(t)
-        tank = 0.0 if self._tank is None else self._tank.tank_energy
-        log.row(
-            (t, self._sent - self._known, t - self._acting, storage, tank),
-            plant.instant.row, self.command, self.acting, self._given.work,
-            *plant.contacts.state, plant.ledger.data,
-        )  # fmt: skip
-
-    def _result(self, log: Log, outcome: Outcome, message: str) -> Run:
-        robot, contacts, actuators = self.robot, self.plant.contacts, self.plant.actuators
-        n, joints, said = robot.n, tuple(robot.joints), log.column("scalars", len(_SCALARS))
-        scalars: dict[str, Array] = dict(zip(_SCALARS, np.ascontiguousarray(said.T)))
-        time = scalars["time"]
-        state = self.plant.instant.split(log.column("instant", self.plant.instant.row.size))
-        works, scalar, stores, moved = np.split(
-            log.column("ledger", sum(ledger_sizes(n))), np.cumsum(ledger_sizes(n))[:-1], axis=1
-        )
-        closed = log.column("closed", contacts.count)
-        sliding = log.column("yielding", contacts.count) > 0.0
+    # Result ------------------------------------------------------------------------------------
+    def _result(self, outcome: Outcome, message: str) -> Run:
+        robot, around, actuators = self.robot, self.plant.surroundings, self.plant.actuators
+        log = self._kernel.Log(*(array[: self._filled()] for array in self._log))
+        joints, ways = tuple(robot.joints), self.exchanges
+        same = self._kernel.SAME * self.clock.physics
+        heard = np.searchsorted(ways.tick, log.time + same, "right") - 1
         return Run(
             outcome=outcome,
             message=message,
             seed=self.seed,
             joints=joints,
-            feet=tuple(contacts.feet[f].contact.frame for f in contacts.foot_of),
-            time=time,
-            **state,
-            tau_command=log.column("tau_command", n),
-            tau_osc=log.column("tau_osc", n),
-            measurement_age=scalars["measurement_age"],
-            command_age=scalars["command_age"],
-            ages=self.exchanges.ages(self.plant.time),
-            contact_mode=(closed * (1 + sliding)).astype(np.int64),
+            feet=tuple(around.feet[f].contact.frame for f in around.foot_of),
+            **{name: getattr(log, name) for name in _LOGGED},
+            measurement_age=np.where(heard < 0, 0.0, (ways.tick - ways.seen)[heard]),
+            command_age=log.time - np.where(log.tick < 0, 0.0, ways.tick[log.tick]),
+            ages=ways.ages(self.plant.time),
             events=tuple(self.plant.events),
             audit=audit(
-                time=time,
+                time=log.time,
                 joints=joints,
-                stores=stores,
-                joint=works.reshape(-1, len(JOINT_FLOWS), n),
-                scalar=scalar,
-                throughput=moved[:, 0],
-                theta_dot=state["theta_dot"],
+                stores=log.stores,
+                joint=log.joint,
+                scalar=log.scalar,
+                throughput=log.moved,
+                theta_dot=log.theta_dot,
                 shaped_inertia=actuators.shaped_inertia,
                 ratio=actuators.rotor_inertia / actuators.shaped_inertia,
-                stated=self._stated(log, scalars),
+                stated=self._stated(log),
             ),
         )
 
-    def _stated(self, log: Log, scalars: dict[str, Array]) -> Stated | None:
+    def _stated(self, log: "Log") -> Stated | None:
         """What the controller said about itself, if it does."""
         if self._storing is None:
             return None
-        tank = scalars["tank"]
         return Stated(
-            storage=scalars["storage"],
-            tank=tank if tank.any() else None,
-            work=log.column("given", self.robot.n),
+            storage=log.storage,
+            tank=log.tank if log.tank.any() else None,
+            work=log.undelayed_work,
             rough=self._given.rough,
         )
 
 
-def _vertical(q: Array) -> tuple[float, float, float]:
+def _vertical(q: Array) -> Array:
     """Return the base's z axis in the world."""
     x, y, z, w = q[3:7].tolist()
-    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
+    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])

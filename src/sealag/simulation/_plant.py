@@ -9,25 +9,26 @@ kernels.contact), torque and velocity limits and Coulomb stick, which act from a
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sealag.actuation import Actuators, motor_parameters
+from sealag.actuation import Actuators, motors_of
 from sealag.errors import InputError
 from sealag.robot import Robot
-from sealag.simulation._contacts import MARGIN, Contacts
+from sealag.simulation._contacts import Surroundings
 from sealag.simulation._ground import FlatGround, Foot, Ground
-from sealag.simulation._instant import Instant
-from sealag.simulation._ledger import Ledger
 from sealag.simulation._outcome import EventKind, Outcome, PlantStop
 from sealag.typing import Array, IntArray
+
+if TYPE_CHECKING:
+    from sealag.kernels.contact import Instant
+    from sealag.kernels.plant import Held
 
 FASTEST = 1e4  # rad/s, m/s: beyond any physical range
 _EVENTS_PER_STEP = 60
 _STABLE = 2.0  # swing of a link on its spring in a step, rad; Runge-Kutta is stable to 2.8
 _LOCATE = 40
-_SAME = 1e-9  # of a step: lengths this close are one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +80,8 @@ class Plant:
         delayed_torque_feedback: bool = False,
         stabilisation: float = 50.0,
     ) -> None:
-        from sealag.kernels import contact, dynamics, motor, plant
+        from sealag.kernels import contact, dynamics, friction, plant
+        from sealag.kernels.ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES, Ledger
 
         if not (np.isfinite(step) and step > 0):
             raise InputError(f"the step must be a time > 0 s, got {step}")
@@ -88,30 +90,35 @@ class Plant:
                 f"actuators are for joints {list(actuators.joints)}, "
                 f"the robot has {list(robot.joints)}"
             )
-        self._kernel, self._contact = plant, contact
+        self._kernel, self._contact, self._friction = plant, contact, friction
         self.robot, self.actuators, self.step_length = robot, actuators, step
-        self.contacts = Contacts(
+        self.surroundings = Surroundings(
             robot, feet, ground or FlatGround(), loaded_frames, stabilisation=stabilisation,
             stop_time=step,
         )  # fmt: skip
-        n, nv, self._sizes = robot.n, robot.nv, self.contacts.sizes
-        self.time = 0.0
-        self._terms = dynamics.allocate(robot.tree[0])
-        self._parameters = motor_parameters(actuators, robot.damping)
-        self._instant = 0.0 if delayed_torque_feedback else 1.0
-        self._tables = (
-            np.empty((n, 4, 9, 9)),
-            np.empty((n, 4, 9, 9)),
-            np.empty((n, 4, 5, 9, 9)),
-        )
-        motor.tables(self._parameters, self._instant, step, *self._tables)
-        self._now, self._next, self._stage = (Instant(self._sizes) for _ in range(3))
-        self._memory = np.zeros(plant.memory_size(nv, n))
-        parts = plant.shared(self._memory, nv, n)
-        self._powers, self._work = parts[2], parts[5]
-        self.ledger = Ledger(self._parameters)
-        self.impulse = np.zeros((self.contacts.count, 3))
+        self.contacts, mounts = self.surroundings.contacts, self.surroundings.mounts
+        self.time, self.instant_feedback = 0.0, not delayed_torque_feedback
+        motors, n = motors_of(actuators, robot.damping), robot.n
+        parts = (robot.tree, mounts, motors, self.contacts)
+        self.raw = tuple(tuple(part) for part in parts)
+        self.raw_terms = tuple(dynamics.allocate(robot.tree))
+        self.now, self._next = (self._allocate() for _ in range(2))
+        self.raw_instants = tuple(self.now), tuple(self._next)
+        shapes = (len(JOINT_FLOWS), n), (len(SCALAR_FLOWS),), (len(STORES),), (1,)
+        self.ledger, gained = (Ledger(*map(np.zeros, shapes)) for _ in range(2))
+        self.raw_ledger, self._raw_gained = tuple(self.ledger), tuple(gained)
+        self.impulse = np.zeros((self.surroundings.count, 3))
         self.events: list[ContactEvent] = []
+
+    def _allocate(self) -> "Instant":
+        robot, count, total = self.robot, self.surroundings.count, len(self.contacts.frame)
+        n, nv = robot.n, robot.nv
+        return self._contact.Instant(
+            q=np.zeros(robot.nq), v=np.zeros(nv), theta=np.zeros(n), theta_dot=np.zeros(n),
+            tau_motor=np.zeros(n), tau_sea=np.zeros(n), acceleration=np.zeros(nv),
+            force=np.zeros((count, 3)), gap=np.full(count, np.inf), position=np.zeros((total, 3)),
+            velocity=np.zeros((total, 3)), power=np.zeros(4), energy=np.zeros(2),
+        )  # fmt: skip
 
     # State -------------------------------------------------------------------------------------
     def start(
@@ -129,23 +136,23 @@ class Plant:
             InputError: A foot begins inside the ground, no contact forces can hold the state, or
                 the step is too long for a light link on a stiff spring.
         """
-        now, n = self._now, self.robot.n
+        now, n = self.now, self.robot.n
         now.q[:], now.v[:] = q, v
-        now.z[:] = 0.0
-        now.z[:, 0] = now.q[-n:] if theta is None else theta
-        now.z[:, 1] = now.v[-n:] if theta_dot is None else theta_dot
+        now.theta[:] = now.q[-n:] if theta is None else theta
+        now.theta_dot[:] = now.v[-n:] if theta_dot is None else theta_dot
+        now.tau_motor[:], now.force[:] = 0.0, 0.0
         self.time = 0.0
         self.events.clear()
-        self.contacts.open_all()
-        self._evaluate(now)
+        self.surroundings.open_all()
+        self._evaluate()
         self.refuse_long_step()
-        self.contacts.refuse_buried(now)
-        self.contacts.measure_gaps(now)
+        self.surroundings.refuse_buried(now)
+        self.surroundings.measure_gaps(now)
         try:
-            self._touch(now, self.contacts.touching(now, tolerance=1e-4))
+            self._touch(self.surroundings.touching(now, tolerance=1e-4))
         except PlantStop as stop:
             raise InputError(f"the run cannot begin: {stop.message}") from None
-        self.ledger.begin(now)
+        self._kernel.begin_books(self.raw, tuple(now), self.raw_ledger)
 
     def refuse_long_step(self) -> None:
         """Refuse a step that is too long for the springs and dampers where the robot is now.
@@ -153,7 +160,7 @@ class Plant:
         Raises:
             InputError: The fastest link on its spring moves too far in a step.
         """
-        rate, joint = fastest_link(self.robot, self.actuators, self.q)
+        rate, joint = fastest_link(self.robot, self.actuators, self.now.q)
         if rate * self.step_length > _STABLE:
             raise InputError(
                 f"the physics step of {self.step_length * 1e3:g} ms is too long: the link of "
@@ -162,46 +169,6 @@ class Plant:
                 "stiff for the link's inertia?"
             )
 
-    @property
-    def q(self) -> Array:
-        """Present configuration of the robot (nq,)."""
-        return self._now.q
-
-    @property
-    def v(self) -> Array:
-        """Present tangent velocity of the robot (nv,)."""
-        return self._now.v
-
-    @property
-    def theta(self) -> Array:
-        """Motor angles (n,), rad."""
-        return self._now.z[:, 0]
-
-    @property
-    def theta_dot(self) -> Array:
-        """Motor speeds (n,), rad/s."""
-        return self._now.z[:, 1]
-
-    @property
-    def motor_torque(self) -> Array:
-        """Torque of the motors (n,), Nm."""
-        return self._now.z[:, 2]
-
-    @property
-    def tau_sea(self) -> Array:
-        """Spring torques (n,), Nm."""
-        return self._now.tau
-
-    @property
-    def force(self) -> Array:
-        """Contact forces in their contact frames (P, 3), N."""
-        return self._now.force
-
-    @property
-    def instant(self) -> Instant:
-        """Everything known about the present instant."""
-        return self._now
-
     def sense(self, t: float, out: Array) -> None:
         """Write what the sensors measure now.
 
@@ -209,9 +176,7 @@ class Plant:
             t: The time that the measurement says, s.
             out: The row of a `Measurement` with one contact flag for each foot.
         """
-        self._contact.sense(
-            self._now.data, self._sizes, self.contacts.closed, self.contacts.foot_of, t, out
-        )
+        self._contact.sense(tuple(self.contacts), tuple(self.now), t, out)
 
     # Motion ------------------------------------------------------------------------------------
     def push(self, load: Array) -> None:
@@ -221,7 +186,7 @@ class Plant:
             load: Forces in the world frame (L, 3), N.
         """
         self.contacts.load[:] = load
-        self._evaluate(self._now)
+        self._evaluate()
 
     def advance(self, instant: float, tau_osc: Array, tau_measured: Array | None = None) -> None:
         """Move to an instant, at most a step ahead, under a held command.
@@ -235,24 +200,23 @@ class Plant:
         Raises:
             PlantStop: The step cannot be completed; the state is that of the last good instant.
         """
-        measured = self._now.tau if tau_measured is None else tau_measured
+        measured = self.now.tau_sea.copy() if tau_measured is None else tau_measured
+        held = self._kernel.Held(tau_osc, measured, self.instant_feedback)
         left = instant - self.time
-        regular = abs(left - self.step_length) <= _SAME * self.step_length
-        if regular:
+        if abs(left - self.step_length) <= self._kernel.SAME * self.step_length:
             left = self.step_length
         for _ in range(_EVENTS_PER_STEP):
-            self.contacts.remember()
-            self._try(left, regular, tau_osc, measured)
-            margin, point = self.contacts.margin(self._next)
-            if margin >= -MARGIN:
-                self._accept(left, regular, tau_osc, measured)
+            sliding = self.contacts.yielding.copy()
+            self._try(left, held)
+            margin, point = self.surroundings.margin(self._next)
+            if margin >= -self._kernel.MARGIN:
+                self._take(left)
                 break
-            done, point = self._locate(left, margin, point, tau_osc, measured)
-            regular = False
-            self._accept(done, regular, tau_osc, measured)
+            done, point = self._locate(left, margin, point, held=held, sliding=sliding)
+            self._take(done)
             self._change(point)
             left -= done
-            if left <= _SAME * self.step_length:
+            if left <= self._kernel.SAME * self.step_length:
                 break
         else:
             raise PlantStop(
@@ -262,71 +226,54 @@ class Plant:
             )
         self.time = instant
 
-    def _try(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
+    def _try(self, step: float, held: "Held") -> None:
         """Fill the next instant with the state one step ahead in the present contact modes."""
-        following, contacts = self._next, self.contacts
         solved = self._kernel.advance(
-            self.robot.tree, self._terms, contacts.around, contacts.state, contacts.rates,
-            self._now.data, self._stage.data, following.data, self._sizes, self._memory,
-            self._motors(tau_osc, measured), step, regular,
-        )  # fmt: skip
+            self.raw, self.raw_terms, self.raw_instants, tuple(held), step, self._raw_gained
+        )
         if not solved:
-            raise self._unsolvable(self._stage, following)
-        if not math.isfinite(following.energy[0]):
+            raise self._unsolvable(self._next)
+        if not math.isfinite(self._next.energy.sum()):
             raise PlantStop(
                 Outcome.DIVERGED, f"velocities are not finite after t = {self.time:.4f} s"
             )
-        contacts.measure_gaps(following)
+        self.surroundings.measure_gaps(self._next)
 
-    def _motors(self, tau_osc: Array, measured: Array) -> tuple[Any, ...]:
-        half, whole, forms = self._tables
-        return self._parameters, self._instant, tau_osc, measured, half, whole, forms
+    def _take(self, step: float) -> None:
+        """Take the next instant for the present one, and book the step."""
+        self._kernel.accept(self.raw, self.raw_instants, self._raw_gained, self.raw_ledger)
+        self.time += step
 
-    def _evaluate(self, at: Instant) -> None:
-        """Evaluate an instant's dynamics and contact forces at its q, v and z."""
-        contacts = self.contacts
-        solved = self._contact.evaluate(
-            self.robot.tree, self._terms, contacts.around, contacts.state, contacts.rates,
-            self._parameters, at.data, self._sizes,
-        )  # fmt: skip
-        if not solved:
-            raise self._unsolvable(at)
+    def _evaluate(self) -> None:
+        """Evaluate dynamics and contact forces of the present instant at its q, v and motors."""
+        if not self._contact.evaluate(self.raw, self.raw_terms, tuple(self.now)):
+            raise self._unsolvable(self.now)
 
-    def _unsolvable(self, *tried: Instant) -> PlantStop:
-        tame = all(float(np.abs(at.v).max()) < FASTEST for at in tried)
+    def _unsolvable(self, tried: "Instant") -> PlantStop:
+        tame = float(np.abs(tried.v).max()) < FASTEST
         return PlantStop(
             Outcome.CONTACT_UNSOLVABLE if tame else Outcome.DIVERGED,
             f"the equations of motion have no solution after t = {self.time:.4f} s",
         )
 
-    def _accept(self, step: float, regular: bool, tau_osc: Array, measured: Array) -> None:
-        """Take the next instant for the present one, and book the step."""
-        if not regular:
-            self._kernel.book_step(
-                self._now.data, self._next.data, self._sizes, self._memory,
-                self._motors(tau_osc, measured), step,
-            )  # fmt: skip
-        self._now, self._next = self._next, self._now
-        self.ledger.add(self._work, self._powers, step, self._now)
-        self.time += step
-
     # Contact changes ---------------------------------------------------------------------------
     def _locate(
-        self, step: float, f_high: float, point: int, tau_osc: Array, measured: Array
+        self, step: float, f_high: float, point: int, *, held: "Held", sliding: Array
     ) -> tuple[float, int]:
         """Shorten the step to where the first margin vanishes (Illinois); return length, point."""
         low, high, middle = 0.0, step, step
-        f_low = max(self.contacts.margin(self._now)[0], MARGIN)
+        tolerance = self._kernel.MARGIN
+        f_low = max(self.surroundings.margin(self.now)[0], tolerance)
         side = 0
         for _ in range(_LOCATE):
             middle = 0.5 * (low + high)
             if math.isfinite(f_low):  # else the gap widens there: halve
                 middle = (low * f_high - high * f_low) / (f_high - f_low)
-            self.contacts.recall()
-            self._try(middle, False, tau_osc, measured)
-            value, at = self.contacts.margin(self._next)
-            point = at if value < MARGIN else point
-            if abs(value) <= MARGIN or high - low <= 1e-9 * self.step_length:
+            self.contacts.yielding[:] = sliding
+            self._try(middle, held)
+            value, at = self.surroundings.margin(self._next)
+            point = at if value < tolerance else point
+            if abs(value) <= tolerance or high - low <= 1e-9 * self.step_length:
                 break
             if value < 0:
                 high, f_high = middle, value
@@ -340,39 +287,50 @@ class Plant:
 
     def _change(self, point: int) -> None:
         """Let a contact point change at the present instant, where its margin has vanished."""
-        now, contacts = self._now, self.contacts
-        before = contacts.closed.copy()
+        now, around = self.now, self.surroundings
+        before = self.contacts.closed.copy()
         if before[point]:
-            contacts.closed[point] = 0
-            contacts.settle(now, np.maximum(contacts.touching(now), before))
-            contacts.lower_floors(now, before)
-            self._evaluate(now)
-            contacts.measure_gaps(now)
+            self.contacts.closed[point] = 0
+            self._resolve(np.maximum(around.touching(now), before))
+            around.lower_floors(now, before)
+            self._evaluate()
+            around.measure_gaps(now)
         else:
-            self._touch(now, contacts.touching(now))
+            self._touch(around.touching(now))
         self._report(before)
 
-    def _touch(self, now: Instant, mask: IntArray) -> None:
+    def _touch(self, mask: IntArray) -> None:
         """Close every masked point by a plastic impact, then find which contacts hold."""
-        contacts = self.contacts
-        for point in np.flatnonzero(mask > contacts.closed):
-            contacts.close(now, int(point))
+        now, around = self.now, self.surroundings
+        for point in np.flatnonzero(mask > self.contacts.closed):
+            around.close(now, int(point))
         if mask.any():
-            touched = contacts.closed.copy()
-            self._strike(now, mask)
-            contacts.settle(now, contacts.touching(now))
-            contacts.lower_floors(now, touched)
-            self._evaluate(now)
-        contacts.measure_gaps(now)
+            touched = self.contacts.closed.copy()
+            lost = self._resolve(mask, impact=True)
+            self._evaluate()
+            self._kernel.book_impact(self.raw, tuple(now), lost, self.raw_ledger)
+            self._resolve(around.touching(now))
+            around.lower_floors(now, touched)
+            self._evaluate()
+        around.measure_gaps(now)
 
-    def _strike(self, now: Instant, mask: IntArray) -> None:
-        speed, impulse = self.contacts.strike(now, mask)
-        mean = 0.5 * np.einsum("pab,b->pa", now.J[: self.contacts.count], now.v + speed)
-        mean = np.einsum("pab,pb->pa", self.contacts.C, mean)
-        now.v[:] = speed
-        self.impulse[:] = impulse
-        self._evaluate(now)
-        self.ledger.strike(-float((mean * impulse).sum()), now)
+    def _resolve(self, mask: IntArray, *, impact: bool = False) -> float:
+        """Find which touching points stay closed; return the energy that an impact takes, J.
+
+        Points that rebound are open afterwards; impulses obey the friction cone.
+        """
+        impulse = self.impulse if impact else np.zeros_like(self.impulse)
+        status, lost = self._contact.resolve(
+            self.raw, self.raw_terms, tuple(self.now), mask, impact, impulse
+        )
+        if status != self._friction.SETTLED:
+            feet = [foot.contact.frame for foot in self.surroundings.feet]
+            touching = sorted({feet[f] for f in self.surroundings.foot_of[mask.nonzero()[0]]})
+            raise PlantStop(
+                Outcome.CONTACT_UNSOLVABLE,
+                f"no contact forces satisfy unilateral contact and friction at {touching}",
+            )
+        return lost
 
     def _report(self, before: IntArray) -> None:
         after = self.contacts.closed
@@ -383,7 +341,7 @@ class Plant:
                 ContactEvent(
                     time=self.time,
                     kind=EventKind.TOUCHDOWN if hit else EventKind.LIFT_OFF,
-                    foot=self.contacts.feet[self.contacts.foot_of[point]].contact.frame,
+                    foot=self.surroundings.feet[self.surroundings.foot_of[point]].contact.frame,
                     point=int(point),
                     impulse=(x, y, z),
                 )

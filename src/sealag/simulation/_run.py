@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from sealag.errors import InputError
 from sealag.simulation._audit import Audit
 from sealag.simulation._exchange import Ages
@@ -65,38 +63,20 @@ class Run:
     audit: Audit
 
 
-class Log:
-    """Rows of a run, allocated once.
+def refuse_large(rows: int, numbers: int) -> None:
+    """Refuse a log that would not fit into memory.
 
     Args:
         rows: How many instants there will be at most.
-        widths: Length of each named column.
+        numbers: How many numbers each has.
 
     Raises:
-        InputError: It would not fit into memory.
+        InputError: It would not.
     """
-
-    def __init__(self, rows: int, widths: dict[str, int]) -> None:
-        ends = np.cumsum(list(widths.values()))
-        size = 8 * rows * int(ends[-1])
-        if size > LARGEST_LOG_BYTES:
-            raise InputError(
-                f"The run would record {rows:.4g} instants in {size / 1e9:.4g} GB of memory, more "
-                f"than {LARGEST_LOG_BYTES / 1e9:g} GB; simulate for a shorter time, or with longer "
-                "periods (delays.sample_time_ms, simulation.physics_step_ms)."
-            )
-        self._table = np.zeros((rows, int(ends[-1])))
-        self._slices = dict(zip(widths, map(slice, [0, *ends[:-1].tolist()], ends.tolist())))
-        self.filled = 0
-
-    def row(self, *columns: Array | IntArray | tuple[float, ...]) -> None:
-        """Append one row, its columns in the order of the widths."""
-        row = self._table[self.filled]
-        for place, column in zip(self._slices.values(), columns):
-            row[place] = column
-        self.filled += 1
-
-    def column(self, name: str, *shape: int) -> Array:
-        """Return what was filled of a column (N, *shape)."""
-        block = self._table[: self.filled, self._slices[name]]
-        return np.ascontiguousarray(block).reshape(self.filled, *shape)
+    size = 8 * rows * numbers
+    if size > LARGEST_LOG_BYTES:
+        raise InputError(
+            f"The run would record {rows:.4g} instants in {size / 1e9:.4g} GB of memory, more "
+            f"than {LARGEST_LOG_BYTES / 1e9:g} GB; simulate for a shorter time, or with longer "
+            "periods (delays.sample_time_ms, simulation.physics_step_ms)."
+        )

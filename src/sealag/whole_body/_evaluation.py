@@ -72,20 +72,18 @@ class LawEvaluation:
         self._kernel = control_law
         self.robot, self.law, self.spring_stiffness = robot, law, spring_stiffness
         frames, self._tasks = read_tasks(robot, law, contacts, posture=posture)
-        self._levels, K_x = self._tasks[2], law.gain(robot)
-        sizes = robot.nv, robot.n, len(self._tasks[0]), len(K_x)
-        self._sizes, self._memory = sizes, np.zeros(operational_space.memory_size(*sizes))
-        self.space = operational_space.divide(self._memory, *sizes)
-        self._allocate(frames)
-        self._gains = (
-            K_x,
-            self.planned_gravity,
-            FORM_CODE[law.stiffness_form],
-            law.task_inertia is TaskInertia.LAMBDA_STAR,
-            RANK_TOLERANCE,
-            law.task_error is TaskError.CONSISTENT,
-            self.gravity_is_fed_back,
+        gains = control_law.Gains(
+            K_x=law.gain(robot),
+            planned_gravity=np.zeros(robot.n),
+            springs=spring_stiffness,
+            form=FORM_CODE[law.stiffness_form],
+            star=law.task_inertia is TaskInertia.LAMBDA_STAR,
+            tolerance=RANK_TOLERANCE,
+            consistent=law.task_error is TaskError.CONSISTENT,
+            fed_back=law.gravity is GravityCompensation.FEEDBACK,
         )
+        self.planned_gravity = gains.planned_gravity
+        self._raw = self._allocate(frames, gains)
         self.follow(np.asarray(posture, dtype=float))
         if law.gravity is GravityCompensation.PLANNED:
             self.planned_gravity[:] = self.space.gravity

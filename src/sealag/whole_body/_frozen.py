@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sealag.actuation import Actuators, motor_parameters
+from sealag.actuation import Actuators, motors_of
 from sealag.robot import Contact, Robot
 from sealag.typing import Array
 from sealag.whole_body._evaluation import LawEvaluation
@@ -317,24 +317,16 @@ class _MotorRows:
 
 
 def _motor_rows(actuators: Actuators, *, instant: bool) -> _MotorRows:
-    """Take the rows from the generator that moves the motors in the simulator."""
-    from sealag.kernels import motor
+    """Take the rows from the equation that moves the motors in the simulator."""
+    from sealag.kernels.motor import rate_rows
 
-    moved = [motor.ANGLE, motor.SPEED, motor.TORQUE, motor.LINK, motor.LINK_SPEED]
-    A, forms = (
-        np.zeros((motor.SIZE, motor.SIZE)),
-        np.zeros((motor.PRODUCTS, motor.SIZE, motor.SIZE)),
-    )
-    every = []
-    for one in motor_parameters(actuators):
-        motor.generator(one, 1.0 if instant else 0.0, motor.REGULAR, A, forms)
-        every.append(A.copy())
-    stacked = np.array(every)
+    speed, torque = np.zeros((2, 6, actuators.n))
+    rate_rows(tuple(motors_of(actuators)), instant, speed, torque)
     ratio = actuators.rotor_inertia / actuators.shaped_inertia
     return _MotorRows(
-        speed=stacked[:, motor.SPEED, moved].T,
-        torque=stacked[:, motor.TORQUE, moved].T,
-        speed_command=stacked[:, motor.SPEED, motor.COMMAND],
-        torque_command=stacked[:, motor.TORQUE, motor.COMMAND],
+        speed=speed[:5],
+        torque=torque[:5],
+        speed_command=speed[5],
+        torque_command=torque[5],
         shift=(1.0 - ratio) / ratio,
     )

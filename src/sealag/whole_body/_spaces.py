@@ -158,7 +158,6 @@ class _SpacesAt(NamedTuple):
     stiffness: Array  # (N, m, m)
     along: Array  # (N, nv, n) overline(UN_s)
     gravity: Array  # (N, n)
-    lift: Array  # (N, m, nv) rows of Λ_k J_k P_k
     J_t: Array  # (N, m, nv)
 
 
@@ -177,31 +176,25 @@ def _spaces_at(robot: Robot, law: Law, q: Array, *, contacts: Sequence[Contact])
 def _solved(
     robot: Robot, stack: Stack, *, gain: Array, levels: list[int], form: int, star: bool
 ) -> _SpacesAt:
-    from sealag.kernels.operational_space import allocate, operational_spaces
+    from sealag.kernels.operational_space import StackedSpaces, StackedTerms, operational_spaces
 
-    count, c, nv = stack.J_s.shape
+    count, _, nv = stack.J_s.shape
     m, n = stack.J_t.shape[1], robot.n
     shapes = ((m, n), (m, m), (m, m), (nv, n), (n,), (m, nv))
-    out = tuple(np.zeros((count, *shape)) for shape in shapes)
+    out = StackedSpaces(*(np.zeros((count, *shape)) for shape in shapes))
+    terms = StackedTerms(M=stack.M, g=stack.g, J_s=stack.J_s, J_t=stack.J_t)
     bad = operational_spaces(
-        stack.M,
-        stack.g,
-        stack.J_s,
-        stack.J_t,
-        gain,
-        np.array(levels),
-        form,
-        star,
-        RANK_TOLERANCE,
-        allocate(nv, n, c, m=m),
-        out,
+        tuple(terms), gain, np.array(levels), form, star, RANK_TOLERANCE, tuple(out)
     )
     if bad >= 0:
         raise RobotError(
             f"The mass matrix of {robot.name} is not positive definite; "
             "a link that moves has no mass or no inertia."
         )
-    return _SpacesAt._make([*out, stack.J_t])
+    return _SpacesAt(
+        J_star=out.J_star, Lambda=out.Lambda, stiffness=out.stiffness, along=out.along,
+        gravity=out.gravity, J_t=stack.J_t,
+    )  # fmt: skip
 
 
 def _singular(

@@ -1,0 +1,327 @@
+"""Small dense linear algebra without allocation: factors, solutions, pseudo-inverses."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+_ROUNDING = 1e-13
+"""Of the trace: what a Cholesky factorisation leaves. Ten times smaller takes rounding for rank; ten
+times larger drops directions that the rank tolerance of tasks, 1e-9, is to decide about."""
+_WORST_CONDITION = 1e4
+"""Up to which A⁺ through G⁻² loses no more than six digits; ten times more loses eight."""
+
+
+@njit(cache=True)
+def multiply(A, B, out):
+    """out = A B for C-contiguous A (m, k), B (k, n), out (m, n)."""
+    m, k = A.shape
+    n = B.shape[1]
+    for i in range(m):
+        for j in range(n):
+            out[i, j] = 0.0
+        for p in range(k):
+            a = A[i, p]
+            if a != 0.0:
+                for j in range(n):
+                    out[i, j] += a * B[p, j]
+
+
+@njit(cache=True)
+def multiply_transposed(A, B, out):
+    """out = A Bᵀ for A (m, k), B (n, k), out (m, n)."""
+    m, k = A.shape
+    n = B.shape[0]
+    for i in range(m):
+        for j in range(n):
+            total = 0.0
+            for p in range(k):
+                total += A[i, p] * B[j, p]
+            out[i, j] = total
+
+
+@njit(cache=True)
+def cholesky(A, L):
+    """Write the lower factor L of A = L Lᵀ (n, n); False if A is not positive definite."""
+    n = A.shape[0]
+    for j in range(n):
+        for i in range(j, n):
+            s = A[i, j]
+            for k in range(j):
+                s -= L[i, k] * L[j, k]
+            if i == j:
+                if not s > 0.0:
+                    return False
+                L[j, j] = math.sqrt(s)
+            else:
+                L[i, j] = s / L[j, j]
+    return True
+
+
+@njit(cache=True)
+def forward_solve(L, x):
+    """x ← L⁻¹ x in place, L (≥ n, ≥ n) lower triangular, x (n,)."""
+    for i in range(x.size):
+        s = x[i]
+        for k in range(i):
+            s -= L[i, k] * x[k]
+        x[i] = s / L[i, i]
+
+
+@njit(cache=True)
+def backward_solve(L, x):
+    """x ← L⁻ᵀ x in place, L (≥ n, ≥ n) lower triangular, x (n,)."""
+    for i in range(x.size - 1, -1, -1):
+        s = x[i]
+        for k in range(i + 1, x.size):
+            s -= L[k, i] * x[k]
+        x[i] = s / L[i, i]
+
+
+@njit(cache=True)
+def invert_spd(A, out, factor):
+    """out = A⁻¹ of a symmetric positive definite A (n, n) by Cholesky; False if it is not.
+
+    ``factor`` (n, n) receives the inverse of the Cholesky factor.
+    """
+    if not cholesky(A, factor):
+        return False
+    n = A.shape[0]
+    for j in range(n):
+        factor[j, j] = 1.0 / factor[j, j]
+        for i in range(j + 1, n):
+            total = 0.0
+            for p in range(j, i):
+                total -= factor[i, p] * factor[p, j]
+            factor[i, j] = total / factor[i, i]
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for p in range(i, n):
+                total += factor[p, i] * factor[p, j]
+            out[i, j] = total
+            out[j, i] = total
+    return True
+
+
+@njit(cache=True)
+def jacobi_eigh(A, values, vectors):
+    """Eigenvalues and eigenvectors (columns) of a symmetric A (n, n); A is overwritten.
+
+    Cyclic Jacobi rotations. Convergence is quadratic: once the off-diagonal part is below 1e-9 of
+    the diagonal, one more sweep takes it below rounding.
+    """
+    n = A.shape[0]
+    for i in range(n):
+        for j in range(n):
+            vectors[i, j] = 1.0 if i == j else 0.0
+    for _ in range(60):
+        off, scale = 0.0, 0.0
+        for i in range(n):
+            scale += A[i, i] * A[i, i]
+            for j in range(i):
+                off += A[i, j] * A[i, j]
+        for p in range(n - 1):
+            for q in range(p + 1, n):
+                _rotate(A, vectors, p, q)
+        if off <= 1e-18 * scale:
+            break
+    for i in range(n):
+        values[i] = A[i, i]
+
+
+@njit(cache=True)
+def _rotate(A, vectors, p, q):
+    if A[p, q] == 0.0:
+        return
+    n = A.shape[0]
+    ratio = (A[q, q] - A[p, p]) / (2.0 * A[p, q])
+    t = 1.0 / (abs(ratio) + np.sqrt(ratio * ratio + 1.0))
+    if ratio < 0.0:
+        t = -t
+    c = 1.0 / np.sqrt(t * t + 1.0)
+    s = t * c
+    for k in range(n):
+        a, b = A[k, p], A[k, q]
+        A[k, p], A[k, q] = c * a - s * b, s * a + c * b
+    for k in range(n):
+        a, b = A[p, k], A[q, k]
+        A[p, k], A[q, k] = c * a - s * b, s * a + c * b
+    for k in range(n):
+        a, b = vectors[k, p], vectors[k, q]
+        vectors[k, p], vectors[k, q] = c * a - s * b, s * a + c * b
+
+
+@njit(cache=True)
+def pseudo_inverse_psd(A, threshold, out, root, values, vectors):
+    """out = A⁺ and root = (A⁺)^½ of a symmetric positive semidefinite A (n, n); A is overwritten.
+
+    Eigenvalues up to ``threshold`` count as zero. Returns the rank.
+    """
+    n = A.shape[0]
+    jacobi_eigh(A, values, vectors)
+    rank = 0
+    for i in range(n):
+        if values[i] > threshold:
+            values[i] = 1.0 / values[i]
+            rank += 1
+        else:
+            values[i] = 0.0
+    for i in range(n):
+        for j in range(i + 1):
+            inverse, half = 0.0, 0.0
+            for k in range(n):
+                product = vectors[i, k] * vectors[j, k]
+                inverse += product * values[k]
+                half += product * np.sqrt(values[k])
+            out[i, j] = inverse
+            out[j, i] = inverse
+            root[i, j] = half
+            root[j, i] = half
+    return rank
+
+
+@njit(cache=True)
+def _factor(A, L, left):
+    """A = L Lᵀ by Cholesky with pivots, rows of Lᵀ (r, n) in ``L``; r, and the trace of A.
+
+    It ends where what is left of every diagonal entry is rounding.
+    """
+    n = A.shape[0]
+    trace = 0.0
+    for i in range(n):
+        left[i] = A[i, i]
+        trace += A[i, i]
+    for r in range(n):
+        p = 0
+        for i in range(1, n):
+            if left[i] > left[p]:
+                p = i
+        if not left[p] > _ROUNDING * max(trace, 0.0):
+            return r, trace
+        L[r] = A[p]
+        for k in range(r):
+            factor = L[k, p]
+            for i in range(n):
+                L[r, i] -= factor * L[k, i]
+        scale = 1.0 / np.sqrt(left[p])
+        for i in range(n):
+            L[r, i] *= scale
+            left[i] -= L[r, i] * L[r, i]
+        left[p] = 0.0
+    return n, trace
+
+
+
+@njit(cache=True)
+def invert_low_rank(A, threshold, out, scratch, values):
+    """out = A⁺ of a symmetric positive semidefinite A (n, n), if that is safe without eigenvalues.
+
+    A = L Lᵀ by Cholesky with pivots, L (n, r), and A⁺ = L G⁻² Lᵀ with G = Lᵀ L, whose eigenvalues
+    are those of A that are not 0.
+
+    Args:
+        A: (n, n), kept.
+        threshold: eigenvalues up to this count as zero.
+        out: (n, n), written.
+        scratch: (5, n, n).
+        values: (≥ n,) scratch.
+
+    Returns:
+        The rank; -1 if eigenvalues must decide what it is, because one may lie near the threshold
+        or A is too badly conditioned. It is given only where it is certain: what is left of the
+        trace is rounding, and λ_r ≥ 1 / trace G⁻¹ is above the threshold.
+    """
+    n = A.shape[0]
+    r, trace = _factor(A, scratch[0], values)
+    L, W = scratch[0][:r], scratch[1][:r]
+    G = scratch[2].ravel()[: r * r].reshape(r, r)
+    G_inverse = scratch[3].ravel()[: r * r].reshape(r, r)
+    multiply_transposed(L, L, G)
+    if not invert_spd(G, G_inverse, scratch[4].ravel()[: r * r].reshape(r, r)):
+        return -1
+    weakest = 0.0
+    for i in range(r):
+        weakest += G_inverse[i, i]
+    if weakest * max(threshold, trace / _WORST_CONDITION) >= 1.0:
+        return -1
+    multiply(G_inverse, L, W)
+    out[:, :] = 0.0
+    for k in range(r):
+        for i in range(n):
+            factor = W[k, i]
+            for j in range(n):
+                out[i, j] += factor * W[k, j]
+    return r
+
+
+
+@njit(cache=True)
+def pseudo_inverse(A, threshold, out, scratch, values):
+    """out = A⁺; eigenvalues only where `invert_low_rank` gives no answer. A is overwritten."""
+    if invert_low_rank(A, threshold, out, scratch, values) < 0:
+        pseudo_inverse_psd(A, threshold, out, scratch[0], values, scratch[1])
+
+
+
+@njit(cache=True)
+def least_squares(A, r, damping, x):
+    """Write the least-squares solution x (m,) of A x = r, damped where A is nearly singular.
+
+    Args:
+        A: (m, m).
+        r: (m,).
+        damping: share of the trace of AᵀA that is added to it.
+        x: (m,), written; not a number if A is not finite.
+    """
+    m = A.shape[0]
+    G, L = np.empty((m, m)), np.zeros((m, m))
+    G[:] = 0.0
+    x[:] = 0.0
+    for k in range(m):
+        for i in range(m):
+            a = A[k, i]
+            x[i] += a * r[k]
+            if a != 0.0:
+                for j in range(i + 1):
+                    G[i, j] += a * A[k, j]
+    trace = 0.0
+    for i in range(m):
+        trace += G[i, i]
+    for i in range(m):
+        G[i, i] += damping * trace + 1e-300
+    if not cholesky(G, L):
+        x[:] = np.nan
+        return
+    forward_solve(L, x)
+    backward_solve(L, x)
+
+
+
+@njit(cache=True)
+def eliminate(A, x, share, scale):
+    """x ← A⁻¹ x in place by elimination without pivoting; A (n, n) is overwritten.
+
+    Args:
+        A: (n, n) whose pivots are positive if the question has an answer.
+        x: (n,).
+        share: of its scale (n,) that each pivot must exceed.
+        scale: (n,).
+
+    Returns:
+        False if a pivot does not.
+    """
+    n = x.size
+    for p in range(n):
+        if not A[p, p] > share * scale[p]:
+            return False
+        for i in range(p + 1, n):
+            factor = A[i, p] / A[p, p]
+            x[i] -= factor * x[p]
+            for j in range(p + 1, n):
+                A[i, j] -= factor * A[p, j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= A[i, j] * x[j]
+        x[i] /= A[i, i]
+    return True
