@@ -52,7 +52,7 @@ def test_answers_with_the_contract(design, criterion, tmp_path, capsys):
 
 def test_motion_of_many_instants(tmp_path, capsys):
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import paper_terrain, plan_walk, walk_motion
 
     system = load("bundled:hume")
     motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=200.0)
@@ -80,7 +80,7 @@ def test_motion_of_many_instants(tmp_path, capsys):
 def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
     """Seven steps at 1 kHz, default proofs, common and time-varying multipliers."""
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import paper_terrain, plan_walk, walk_motion
 
     system = load("bundled:hume")
     motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=7), rate=1000.0)
@@ -114,7 +114,7 @@ def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
 
 def test_proofs_are_as_many_as_asked_for(tmp_path, capsys):
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import paper_terrain, plan_walk, walk_motion
 
     system = load("bundled:hume")
     walk, out = tmp_path / "walk.npz", tmp_path / "c.json"

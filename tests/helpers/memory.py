@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from sealag.design import load
-from sealag.locomotion import FlatTerrain, begin_walk
+from sealag.walking import FlatTerrain, begin_walk
 from sealag.whole_body import Controller, Measurement, Tank
 
 WARM, TICKS = 1_000, 10_000
