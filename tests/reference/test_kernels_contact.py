@@ -5,10 +5,16 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import minimize
 
-from sealag.kernels import contact, friction, rigid
+from helpers.kernels import from_python
+from sealag.kernels import contact, friction, linalg, spatial
 from sealag.robot import load_robot
+from sealag.whole_body import Measurement
 
 FEET = ("left_foot", "right_foot")
+SOLVE, SETTLE = from_python(friction.solve), from_python(friction.settle)
+PROJECT, CHOLESKY = from_python(contact.project), from_python(linalg.cholesky)
+EQUATIONS = from_python(friction.allocate_equations)
+INTEGRATE, TANGENT_RATE = from_python(spatial.integrate), from_python(spatial.tangent_rate)
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +29,7 @@ class TestManifold:
         for _ in range(20):
             q = pin.randomConfiguration(hume._model, np.full(13, -1.0), np.full(13, 1.0))
             u, out = size * rng.normal(size=12), np.empty(13)
-            rigid.integrate(q, u, 6, out)
+            INTEGRATE(q, u, 6, out)
             expected = pin.integrate(hume._model, q, u)
             if expected[3:7] @ out[3:7] < 0:
                 expected[3:7] *= -1
@@ -34,19 +40,34 @@ class TestManifold:
         rng = np.random.default_rng(1)
         for size, tolerance in ((1e-2, 1e-9), (1e-1, 1e-5)):
             u, v, out = size * rng.normal(size=12), rng.normal(size=12), np.empty(12)
-            rigid.tangent_rate(u, v, 6, out)
+            TANGENT_RATE(u, v, 6, out)
             _, J = pin.dIntegrate(hume._model, hume.neutral(), u)
             np.testing.assert_allclose(J @ out, v, atol=tolerance)
 
 
 def test_a_measurement_row():
     """Time, q, v, motor angles and speeds, spring torques and loaded feet lie where they belong."""
-    sizes = (8, 7, 1, 3, 3, 2, 2)
-    data = np.arange(1.0, 1.0 + contact.memory_size(sizes))
+    rng = np.random.default_rng(3)
+    shapes = dict.fromkeys(contact.Instant._fields, (1,)) | {
+        "q": (8,), "v": (7,), "acceleration": (7,), "force": (3, 3), "position": (3, 3),
+        "velocity": (3, 3), "gap": (3,), "power": (4,), "energy": (2,),
+    }  # fmt: skip
+    now = contact.Instant(**{name: rng.normal(size=shape) for name, shape in shapes.items()})
+    contacts = contact.Contacts(
+        frame=np.array([0, 0, 1]), offset=np.zeros((3, 3)), C=np.tile(np.eye(3), (3, 1, 1)),
+        anchor=np.zeros((3, 3)), friction=np.ones(3), ridge=np.ones(3), radius=np.zeros(3),
+        torsion_damping=np.zeros(2), torsion_radius=np.zeros(2), load=np.zeros((0, 3)),
+        closed=np.array([0, 1, 0]), yielding=np.zeros(3), floor=np.zeros(3), ground_x=np.zeros(1),
+        ground_z=np.zeros(1), stabilisation=50.0, stop_time=1e-3, weight=1.0,
+    )  # fmt: skip
     row = np.full(1 + 8 + 7 + 3 + 2, np.nan)
-    contact.sense(data, sizes, np.array([0, 1, 0]), np.array([0, 0, 1]), 0.5, row)
-    q, v, z, _, _, tau, *_ = contact.parts(data, sizes)
-    np.testing.assert_array_equal(row, np.concatenate([[0.5], q, v, z[0, :2], tau, [1.0, 0.0]]))
+    contact.sense(tuple(contacts), tuple(now), 0.5, row)
+    seen = Measurement.allocate(nq=8, nv=7, n=1, contacts=2)
+    seen.data[:] = row
+    assert seen.time == 0.5
+    for name in ("q", "v", "theta", "theta_dot", "tau_sea"):
+        np.testing.assert_array_equal(getattr(seen, name), getattr(now, name))
+    np.testing.assert_array_equal(seen.contact, [1.0, 0.0])
 
 
 def _instant(hume, q, v):
@@ -59,18 +80,26 @@ def _instant(hume, q, v):
     return workspace.M.copy(), workspace.nle.copy(), (J, R, p, drift)
 
 
-def _solve(M, right, J, C, target, closed, mu):
-    nv, count = len(M), len(closed)
-    L, rows = np.zeros((nv, nv)), np.zeros((count, 3, nv))
-    assert rigid.cholesky(M, L)
-    contact.project(L, J, C, closed, rows)
-    free = np.linalg.solve(L, right)
-    x, force, yielding = np.zeros(nv), np.zeros((count, 3)), np.zeros(count)
-    none, foot_of = np.zeros((0, 2)), np.zeros(count, np.int64)
-    assert friction.solve(
-        L, rows, free, target, closed, mu, np.full(count, 1e-11), yielding, foot_of, none,
-        np.zeros((0, nv)), np.zeros(0), x, force,
+def _equations(M, right, J, C, target, closed):
+    eq = EQUATIONS(len(M), len(closed), 0)
+    assert CHOLESKY(M, eq.L)
+    PROJECT(eq.L, J, C, closed, eq.rows)
+    eq.free[:], eq.target[:] = np.linalg.solve(eq.L, right), target
+    return eq
+
+
+def _surfaces(mu):
+    count = len(mu)
+    return friction.Surfaces(
+        foot=np.zeros(count, np.int64), friction=mu, ridge=np.full(count, 1e-11),
+        torsion_damping=np.zeros(0), torsion_radius=np.zeros(0),
     )  # fmt: skip
+
+
+def _solve(M, right, J, C, target, closed, mu):
+    eq = _equations(M, right, J, C, target, closed)
+    x, force, yielding = np.zeros(len(M)), np.zeros((len(closed), 3)), np.zeros(len(closed))
+    assert SOLVE(eq, _surfaces(mu), closed, yielding, x, force)
     return x, force, yielding
 
 
@@ -154,20 +183,16 @@ def test_sliding_force_dissipates_most_for_one_point():
 
 def test_settle_opens_what_pulls():
     """A bar on two points, lifted at one end: only the other end stays on the ground."""
-    M, rows = np.diag([1.0, 0.1]), None
+    M = np.diag([1.0, 0.1])
     J = np.zeros((2, 3, 2))
     J[:, 2] = [[1.0, -0.5], [1.0, 0.5]]
-    L, rows = np.zeros((2, 2)), np.zeros((2, 3, 2))
-    rigid.cholesky(M, L)
-    contact.project(L, J, np.tile(np.eye(3), (2, 1, 1)), np.ones(2, np.int64), rows)
-    free = np.linalg.solve(L, np.array([-9.81, 20.0]))
     closed, mask = np.ones(2, np.int64), np.ones(2, np.int64)
+    eq = _equations(
+        M, np.array([-9.81, 20.0]), J, np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), closed
+    )
     x, force = np.zeros(2), np.zeros((2, 3))
-    status = friction.settle(
-        L, rows, free, np.zeros((2, 3)), mask, closed, np.zeros(2), np.full(2, 1e-11), np.zeros(2),
-        np.zeros(2, np.int64), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), 1e-9, x, force,
-    )  # fmt: skip
-    assert status == 0
+    status = SETTLE(eq, _surfaces(np.zeros(2)), mask, closed, np.zeros(2), 1e-9, x, force)
+    assert status == friction.SETTLED
     np.testing.assert_array_equal(closed, [1, 0])
     assert force[0, 2] > 0
     assert (J[1, 2] @ x) > 0

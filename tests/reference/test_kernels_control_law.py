@@ -1,24 +1,24 @@
 """The compiled parts of a controller's tick against plain NumPy and SciPy twins."""
 
 import itertools
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sealag.kernels.control_law import (
-    frame_error,
-    gravity_slope,
-    law,
-    leave_to_higher,
-    static_step,
-)
-from sealag.kernels.operational_space import SYMMETRIC, allocate, memory_size, operational_space
+from helpers.kernels import from_python, newton_of, solve_space, space_of
+from sealag.kernels import control_law
+from sealag.kernels.operational_space import SYMMETRIC
 from sealag.robot import Contact, load_robot
-from sealag.whole_body import Law, Task, TaskKind
-from sealag.whole_body._task_reader import read_tasks
+from sealag.whole_body import GravityCompensation, Law, Task, TaskKind
+from sealag.whole_body._evaluation import LawEvaluation
 
+frame_error = from_python(control_law.frame_error)
+gravity_slope = from_python(control_law.gravity_slope)
+leave_to_higher = control_law.leave_to_higher
+static_step = from_python(control_law.static_step)
 CONTACTS = (Contact(frame="left_foot"), Contact(frame="right_foot"))
 GAINS = np.array([100.0, 120.0, 90.0, 60.0, 50.0, 40.0, 30.0])
 LEVELS = np.array([0, 6, 7])
@@ -63,8 +63,8 @@ def test_errors_of_lower_tasks_move_as_their_own_jacobian_says(levels):
     nv, m = 9, levels[-1]
     X = rng.normal(size=(nv, nv))
     M, J = X @ X.T + np.eye(nv), rng.normal(size=(m, nv))
-    space = allocate(nv, nv, 0, m=m)
-    assert operational_space(
+    space = space_of(nv, nv, 0, m=m)
+    assert solve_space(
         M, np.zeros(nv), np.zeros((0, nv)), J, np.eye(m), np.array(levels), SYMMETRIC, False, 1e-9,
         space,
     )  # fmt: skip
@@ -95,8 +95,9 @@ def test_static_step_is_newton_s(symmetric, slope, plain):
     F, G = J.T @ S @ moved_by, slope * 5.0 * rng.normal(size=(n, n))
     K = 1.5 * np.linalg.norm(F - G, 2) * rng.uniform(1.0, 2.0, n)
     torque, sag = rng.normal(size=n), rng.normal(size=n)
-    step, moved = np.zeros(n), sag.copy()
-    assert static_step(J, moved_by, S, G, K, torque, moved, np.zeros((n, n)), step)
+    moved, newton = sag.copy(), newton_of(n, n, m, slope=G, J=moved_by)
+    assert static_step(J, S, K, torque, moved, newton)
+    step = newton.step
     expected = np.linalg.solve(np.diag(K) - F + G, -K * sag - torque)
     np.testing.assert_allclose(step, expected, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(moved, sag + expected, rtol=1e-9)
@@ -120,9 +121,8 @@ def test_static_step_refuses_exactly_where_the_fixed_point_is_no_contraction(see
     for share in (0.999, 1.001):
         scaled = share / factor
         task, slope = (S * scaled, 0.0 * F) if of == "tasks" else (0.0 * S, -F * scaled)
-        exists = static_step(
-            J, J, task, slope, K, np.zeros(5), np.zeros(5), np.zeros((5, 5)), np.zeros(5)
-        )
+        newton = newton_of(5, 5, 3, slope=slope, J=J)
+        exists = static_step(J, task, K, np.zeros(5), np.zeros(5), newton)
         assert exists == (share < 1.0)
 
 
@@ -134,8 +134,9 @@ def test_gravity_slope_is_that_of_the_potential_along_given_motions(seed):
     q, W = robot.integrate(posture, 0.4 * rng.normal(size=12)), rng.normal(size=(12, 6))
     at = robot.workspace()
     at.update(q, np.zeros(12))
-    out = np.full((6, 6), np.nan)
-    gravity_slope(robot.tree, at.terms, W, np.zeros((12, 12)), np.zeros((12, 6)), out)
+    newton = newton_of(12, 6, 0, slope=np.full((6, 6), np.nan))
+    out = newton.slope
+    gravity_slope(robot.tree, at.terms, W, newton)
 
     def force(step):
         return W.T @ robot.gravity(robot.integrate(q, step))
@@ -146,7 +147,7 @@ def test_gravity_slope_is_that_of_the_potential_along_given_motions(seed):
     np.testing.assert_allclose(out, expected, atol=1e-6 * np.abs(expected).max())
     there = robot.integrate(q, 0.1 * rng.normal(size=12))
     at.update(there, np.zeros(12))
-    gravity_slope(robot.tree, at.terms, W, np.zeros((12, 12)), np.zeros((12, 6)), out)
+    gravity_slope(robot.tree, at.terms, W, newton)
     assert np.abs(out - expected).max() > 1e-2 * np.abs(expected).max(), "it must depend on q"
 
 
@@ -156,8 +157,8 @@ def plain_law(robot, q, joints, along, offset):
     J_s = robot.contact_jacobian(CONTACTS, there)
     turn = robot.frame_jacobian("torso", there)[3:]
     J_t = np.vstack([robot.com_jacobian(there), turn, np.eye(12)[[8]]])
-    space, m = allocate(12, 6, 6, m=7), 7
-    assert operational_space(
+    space, m = space_of(12, 6, 6, m=7), 7
+    assert solve_space(
         robot.mass_matrix(there), robot.gravity(there), J_s, J_t, np.diag(GAINS), LEVELS, SYMMETRIC,
         False, 1e-9, space,
     )  # fmt: skip
@@ -187,21 +188,13 @@ def test_law_is_its_parts_one_after_the_other():
             ),
         )
     )  # fmt: skip
-    frames, tasks = read_tasks(robot, chosen, CONTACTS, posture=posture)
-    q, offset = robot.integrate(posture, 0.05 * rng.normal(size=12)), 0.01 * rng.normal(size=7)
-    joints, along = q[-6:] + 0.02 * rng.normal(size=6), rng.normal(size=(12, 6))
-    count, sizes, out = len(frames), (12, 6, 6, 7), np.zeros(6)
-    seen = (
-        *robot.frame_mounts(frames),
-        *(np.zeros((count, *shape)) for shape in ((6, 12), (3, 3), (3,), (6,))),
-    )
-    error = np.zeros(7)
-    assert law(
-        robot.tree, robot.workspace().terms, seen, tasks,
-        (np.diag(GAINS), np.zeros(6), SYMMETRIC, False, 1e-9, True, True),
-        (q, joints, along, offset), (np.zeros((6, 12)), np.zeros((7, 12)), error, np.zeros(7), out),
-        np.zeros(memory_size(*sizes)), sizes,
-    )  # fmt: skip
-    torque, left = plain_law(robot, q, joints, along, offset)
-    np.testing.assert_allclose(error, left, atol=1e-11)
+    chosen = replace(chosen, gravity=GravityCompensation.FEEDBACK)
+    law = LawEvaluation(robot, chosen, np.ones(6), contacts=CONTACTS, posture=posture)
+    q, law.offset[:] = robot.integrate(posture, 0.05 * rng.normal(size=12)), 0.01 * rng.normal(size=7)
+    joints, out = q[-6:] + 0.02 * rng.normal(size=6), np.zeros(6)
+    law.follow(posture)
+    along = law.space.joint_from_base.copy()
+    law.at(q, joints, out)
+    torque, left = plain_law(robot, q, joints, along, law.offset)
+    np.testing.assert_allclose(law.error, left, atol=1e-11)
     np.testing.assert_allclose(out, torque, rtol=1e-9, atol=1e-9)

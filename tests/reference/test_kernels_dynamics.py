@@ -45,9 +45,9 @@ def instant(urdf, request):
     q = pin.randomConfiguration(model, np.full(model.nq, -1.0), np.full(model.nq, 1.0))
     if request.param:
         q[:3] += 50.0
-    v, data, terms = rng.normal(size=model.nv), model.createData(), dynamics.allocate(robot.tree[0])
-    dynamics.evaluate(robot.tree, q, v, terms)
-    dynamics.evaluate(robot.tree, q, v, terms)  # nothing is left from the first time
+    v, data, terms = rng.normal(size=model.nv), model.createData(), dynamics.allocate(robot.tree)
+    for _ in range(2):
+        dynamics.evaluate(tuple(robot.tree), q, v, tuple(terms))  # nothing is left from the first time
     pin.computeAllTerms(model, data, q, v)
     return robot, q, v, terms, data
 
@@ -59,28 +59,28 @@ def close(ours, theirs):
 
 def test_terms_are_pinocchio_s(instant):
     robot, q, v, terms, data = instant
-    M, nle, _, R, p, _, _, com, com_jacobian, momentum, energy = terms
-    close(M, data.M)
-    close(nle, data.nle)
-    close(R, [place.rotation for place in data.oMi])
-    close(p, [place.translation for place in data.oMi])
-    close(com[0], data.com[0])
-    close(com[1], data.vcom[0])
-    close(com_jacobian, data.Jcom)
-    close(momentum, data.hg.vector)
-    close(energy, [data.kinetic_energy, data.potential_energy])
+    close(terms.M, data.M)
+    close(terms.nle, data.nle)
+    close(terms.rotation, [place.rotation for place in data.oMi])
+    close(terms.position, [place.translation for place in data.oMi])
+    close(terms.com, data.com[0])
+    close(terms.com_velocity, data.vcom[0])
+    close(terms.com_jacobian, data.Jcom)
+    close(terms.momentum, data.hg.vector)
+    close(terms.energy, [data.kinetic_energy, data.potential_energy])
     pin.forwardKinematics(robot._model, data, q, v, np.zeros_like(v))
     pin.centerOfMass(robot._model, data, pin.KinematicLevel.ACCELERATION)
-    close(com[2], data.acom[0])
+    close(terms.com_drift, data.acom[0])
 
 
 def test_frames_are_pinocchio_s(instant):
     """Jacobian, place and J̇ v of every frame, from the joints' terms alone."""
     robot, q, v, terms, data = instant
     model, names, nv = robot._model, robot.frame_names(), robot.nv
-    shapes = ((6, nv), (3, 3), (3,), (6,))
-    J, R, p, bias = (np.full((len(names), *shape), np.nan) for shape in shapes)
-    dynamics.frames(terms, robot.frame_mounts(names), J, R, p, bias)
+    ours = dynamics.allocate_frames(len(names), nv)
+    for array in ours:
+        array[:] = np.nan
+    dynamics.frames(tuple(terms), tuple(robot.frame_mounts(names)), tuple(ours))
     pin.updateFramePlacements(model, data)
     pin.forwardKinematics(model, data, q, v, np.zeros_like(v))
     pin.computeJointJacobians(model, data, q)
@@ -89,12 +89,12 @@ def test_frames_are_pinocchio_s(instant):
     world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     for f, name in enumerate(names):
         number = model.getFrameId(name)
-        close(J[f], pin.getFrameJacobian(model, data, number, world))
-        close(R[f], data.oMf[number].rotation)
-        close(p[f], data.oMf[number].translation)
-        close(bias[f], pin.getFrameClassicalAcceleration(model, data, number, world).vector)
+        close(ours.J[f], pin.getFrameJacobian(model, data, number, world))
+        close(ours.R[f], data.oMf[number].rotation)
+        close(ours.p[f], data.oMf[number].translation)
+        close(ours.drift[f], pin.getFrameClassicalAcceleration(model, data, number, world).vector)
         close(at.frame_velocity(name), pin.getFrameVelocity(model, data, number, world).vector)
-        close(at.frame_jacobian(name), J[f])
+        close(at.frame_jacobian(name), ours.J[f])
 
 
 def test_gravity_torque_is_pinocchio_s(instant):
@@ -108,7 +108,7 @@ def test_gravity_gradient_is_pinocchio_s(instant):
     """Among the base's own directions its symmetric part."""
     robot, q, _, terms, data = instant
     H = np.full((robot.nv, robot.nv), np.nan)
-    dynamics.gravity_gradient(robot.tree, terms, H)
+    dynamics.gravity_gradient(tuple(robot.tree), tuple(terms), H)
     expected = pin.computeGeneralizedGravityDerivatives(robot._model, data, q)
     base = robot.nv_base
     expected[:base, :base] = 0.5 * (expected[:base, :base] + expected[:base, :base].T)

@@ -5,17 +5,36 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 
+from helpers.kernels import from_python
 from sealag.kernels import motor
+from sealag.kernels.ledger import (
+    COMMAND,
+    COULOMB,
+    DAMPING,
+    JOINT_DAMPING,
+    MOTOR_WORK,
+    PORT,
+    SHAFT,
+    SPRING_DAMPING,
+    VISCOUS,
+)
 
 COLUMNS = (
     "K", "D_s", "B", "ratio", "D", "viscous", "coulomb", "limit", "speed", "bandwidth", "bearing",
 )  # fmt: skip
+TRAVEL, MOVE, RATES = (from_python(kernel) for kernel in (motor.travel, motor.move, motor.rates))
+LINK_WORK, SERIES = from_python(motor.link_work), from_python(motor.allocate_series)
 
 
 def parameters(**changes):
     ideal = (np.inf,) * 3
     values = dict(zip(COLUMNS, (350.0, 0.5, 0.093, 2.0, 100.0, 0.2, 0.0, *ideal, 0.0)))
     return np.array([[{**values, **changes}[name] for name in COLUMNS]])
+
+
+def motors_of(p):
+    """The rows of parameters as kernels take them."""
+    return motor.Motors(*(np.ascontiguousarray(column) for column in p.T))
 
 
 def reference_matrix(p, instant, variant):
@@ -37,38 +56,61 @@ def reference_matrix(p, instant, variant):
     return A, [*pairs, (tau_m, omega)]
 
 
-@pytest.mark.parametrize("variant", range(4))
+@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("locked", [False, True])
 @pytest.mark.parametrize("bandwidth", [np.inf, 300.0])
 @pytest.mark.parametrize("step", [1e-3, 2e-2])
-def test_exponentials_and_works(variant, bandwidth, step):
-    p = parameters(bandwidth=bandwidth)[0]
-    A, Q = np.empty((9, 9)), np.empty((5, 9, 9))
-    motor.generator(p, 1.0, variant, A, Q)
-    expected, pairs = reference_matrix(p, 1.0, variant)
-    np.testing.assert_allclose(A, expected, atol=1e-12)
-    E, W = np.empty((9, 9)), np.empty((5, 9, 9))
-    motor.advance(A, Q, step, E, W)
-    np.testing.assert_allclose(E, expm(A * step), rtol=1e-10, atol=1e-10)
+def test_a_rotor_moves_as_the_matrix_exponential_says(limited, locked, bandwidth, step):
+    """State and works of every mode: z = [rotor, link, u, w] obeys ż = A z."""
+    p = parameters(bandwidth=bandwidth)
+    A, pairs = reference_matrix(p[0], 1.0, limited + 2 * locked)
     z = np.random.default_rng(1).normal(size=9)
-    for form, (a, b) in zip(W, pairs):
+    if locked:
+        z[1] = z[8] = 0.0
+    motors, drive = motors_of(p), motor.Drive(limited, locked, z[7], z[8])
+    rotor, link = motor.Rotor(*z[:3]), motor.Link(*z[3:7])
+    rate, _, _ = RATES(motors, 0, True, drive, rotor, link.angle, link.speed)
+    np.testing.assert_allclose(rate, (A @ z)[:3], atol=1e-9)
+    after, works = TRAVEL(motors, 0, True, drive, rotor, link, step, SERIES(), True)
+    end = expm(A * step) @ z
+    np.testing.assert_allclose(after, end[:3], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(motor.link_at.py_func(link, step), end[3:7], rtol=1e-12)
+    for found, (a, b) in zip(works, pairs):
 
         def power(s, a=a, b=b):
             y = expm(A * s) @ z
             return (a @ y) * (b @ y)
 
-        assert z @ form @ z == pytest.approx(
+        assert found == pytest.approx(
             quad(power, 0, step, epsrel=1e-11, limit=200)[0], rel=1e-9, abs=1e-12
         )
 
 
-def _move(p, z, tau, step, regular, instant=1.0, measured=0.0):
+def test_each_mode_moves_otherwise():
+    """Negative control of the test above: its cases tell the modes apart."""
+    ends = set()
+    for limited in (False, True):
+        for bandwidth in (np.inf, 300.0):
+            drive = motor.Drive(limited, False, 3.0, 0.0)
+            after, _ = TRAVEL(
+                motors_of(parameters(bandwidth=bandwidth)), 0, True, drive,
+                motor.Rotor(0.1, 0.3, 0.0), motor.Link(0.08, 0.5, -2.0, 30.0), 1e-3, SERIES(), True,
+            )  # fmt: skip
+            ends.add(round(after.speed, 6))
+    assert len(ends) == 4
+
+
+def _move(p, z, tau, step, instant=1.0, measured=0.0):
+    """Move the rotors of z (n, 9) = [rotor, link, ...]; their rotors (n, 3) and works (9, n)."""
     n = len(p)
-    half, whole = np.empty((n, 4, 9, 9)), np.empty((n, 4, 9, 9))
-    forms, work = np.empty((n, 4, 5, 9, 9)), np.zeros((n, 8))
-    motor.tables(p, instant, step, half, whole, forms)
-    tau, measured = np.full(n, tau), np.full(n, measured)
-    motor.move(p, instant, tau, measured, z, step, whole, forms, regular, True, work)
-    return z, work
+    held = motor.Held(np.full(n, tau), np.full(n, measured), bool(instant))
+    flows, moved = np.full((9, n), np.nan), np.zeros((n, 3))
+    for j in range(n):
+        moved[j] = MOVE(
+            motors_of(p), j, held, motor.Rotor(*z[j, :3]), motor.Link(*z[j, 3:7]), step, SERIES(),
+            flows,
+        )  # fmt: skip
+    return moved, flows
 
 
 def _simulate(p, z, tau, step, instant=1.0, measured=0.0):
@@ -104,25 +146,24 @@ def _simulate(p, z, tau, step, instant=1.0, measured=0.0):
         ({"limit": 6.0, "coulomb": 0.5, "D_s": 0.0}, -40.0),
     ],
 )
-@pytest.mark.parametrize("regular", [True, False])
-def test_move_with_friction_and_limits(changes, tau, regular):
+def test_move_with_friction_and_limits(changes, tau):
     p = parameters(**changes)
     z = np.zeros((1, 9))
     z[0, :7] = [0.1, 0.3, 0.0, 0.08, 0.5, -2.0, 30.0]
     expected = _simulate(p, z[0].copy(), tau, 4e-3)
-    moved, work = _move(p, z, tau, 4e-3, regular)
+    moved, work = _move(p, z, tau, 4e-3)
     np.testing.assert_allclose(moved[0, :2], expected[:2], rtol=2e-5, atol=2e-6)
     np.testing.assert_allclose(
-        [work[0, 4], p[0, 6] * work[0, 5], work[0, 6]], expected[2:], rtol=1e-3, atol=2e-5
+        work[[MOTOR_WORK, COULOMB, COMMAND], 0], expected[2:], rtol=1e-3, atol=2e-5
     )
 
 
 def test_coulomb_friction_holds_and_lets_go():
     p = parameters(coulomb=2.0, D=5.0, ratio=1.0)
-    held, work = _move(p, np.zeros((1, 9)), 1.9, 1e-2, True)
+    held, work = _move(p, np.zeros((1, 9)), 1.9, 1e-2)
     assert held[0, 0] == held[0, 1] == 0.0
     assert not work.any()
-    gone, _ = _move(p, np.zeros((1, 9)), 2.1, 1e-2, True)
+    gone, _ = _move(p, np.zeros((1, 9)), 2.1, 1e-2)
     assert gone[0, 0] > 0.0
 
 
@@ -131,44 +172,49 @@ def test_velocity_limit_takes_away_driving_torque(way):
     p = parameters(speed=1.0, D=0.1, D_s=0.0, viscous=0.0, K=1e-6)
     z = np.zeros((1, 9))
     z[0, 1] = 1.5 * way
-    moved, work = _move(p, z, 50.0 * way, 1e-3, True)
+    moved, work = _move(p, z, 50.0 * way, 1e-3)
     assert moved[0, 1] == pytest.approx(1.5 * way, abs=1e-6)
-    assert abs(work[0, 4]) < 1e-9
-    braking, _ = _move(p, moved.copy(), -50.0 * way, 1e-3, True)
+    assert abs(work[MOTOR_WORK, 0]) < 1e-9
+    z[0, :3] = moved
+    braking, _ = _move(p, z, -50.0 * way, 1e-3)
     assert abs(braking[0, 1]) < 1.5
-    z[0, 1] = 0.5 * way  # below the limit the motor drives
-    driven, _ = _move(p, z, 50.0 * way, 1e-3, True)
+    z[0, :3] = 0.0, 0.5 * way, 0.0  # below the limit the motor drives
+    driven, _ = _move(p, z, 50.0 * way, 1e-3)
     assert driven[0, 1] * way > 0.5
 
 
 def test_link_work_is_the_integral_of_its_squared_speed():
-    rng, z, work, step = np.random.default_rng(4), np.zeros((2, 9)), np.zeros((2, 8)), 3e-3
-    ends = rng.normal(size=(4, 2))
-    motor.link_cubic(z, *ends, step)
-    motor.add_link_work(z, step, work)
-    for row, done, end in zip(z, work[:, 7], ends[3]):
-        speed = np.polynomial.Polynomial([row[4], row[5], row[6] / 2])
+    rng, step = np.random.default_rng(4), 3e-3
+    for ends in rng.normal(size=(2, 4)):
+        link = motor.link_through.py_func(*ends, step)
+        speed = np.polynomial.Polynomial([link.speed, link.bend, link.jerk / 2])
+        done = LINK_WORK(link, step)
         assert done == pytest.approx(quad(lambda t, v=speed: v(t) ** 2, 0, step)[0], rel=1e-12)
-        assert speed(step) == pytest.approx(end)
-    assert not work[:, :7].any()
+        assert speed(step) == pytest.approx(ends[3])
+        assert motor.link_at.py_func(link, step).angle == pytest.approx(ends[2])
 
 
-def test_tally_weighs_every_work_with_its_own_coefficient():
+def test_every_work_has_its_own_coefficient():
     """Nine flows of two joints, all different: D_θ, friction, D_s and bearing where they belong."""
     rng = np.random.default_rng(5)
-    p, work, z, q = rng.uniform(1, 2, (2, 11)), rng.uniform(1, 2, (2, 8)), np.zeros((2, 9)), [0, 0]
-    joint, scalar, energy = np.zeros((9, 2)), np.zeros(5), np.zeros(4)
-    powers = rng.uniform(1, 2, (4, 6))
-    motor.tally(p, work, powers, 0.6, z, np.array(q, float), powers[0], joint, scalar, energy,
-                np.zeros(1))  # fmt: skip
-    w, one = work.T, np.ones(2)
-    expected = np.array(
-        [one * w[1], w[2], w[4], w[6], p[:, 4] * w[0], p[:, 5] * w[0], p[:, 6] * w[5],
-         p[:, 1] * w[3], p[:, 10] * w[7]]
-    )  # fmt: skip
-    np.testing.assert_allclose(joint, expected)
-    simpson = np.array([1, 2, 2, 1]) @ powers[:, :4] / 6 * 0.6
-    np.testing.assert_allclose(scalar, [*simpson, 0.0])
+    works, way, flows = motor.Works(*rng.uniform(1, 2, 5)), -0.7, np.zeros((9, 2))
+    p = rng.uniform(1, 2, (2, 11))
+    motors = motors_of(p)
+    for j in (0, 1):
+        from_python(motor._book)(motors, j, works, way, 3.0, flows)
+    expected = np.zeros((9, 2))
+    one = np.ones(2)
+    expected[PORT], expected[SHAFT] = works.port * one, works.shaft * one
+    expected[MOTOR_WORK], expected[COMMAND] = works.motor * one, 3.0 * way * one
+    expected[DAMPING] = p[:, 4] * works.speed_squared
+    expected[VISCOUS] = p[:, 5] * works.speed_squared
+    expected[COULOMB] = p[:, 6] * abs(way)
+    expected[SPRING_DAMPING] = p[:, 1] * works.slip_squared
+    np.testing.assert_allclose(flows, expected)
+    z = np.zeros((2, 9))
+    z[:, 4] = 0.3  # a link that moves with constant speed
+    _, moved = _move(p, z, 0.0, 1e-3)
+    np.testing.assert_allclose(moved[JOINT_DAMPING], p[:, 10] * 0.3**2 * 1e-3)
 
 
 def test_late_torque_feedback_is_held():
@@ -176,5 +222,5 @@ def test_late_torque_feedback_is_held():
     z = np.zeros((1, 9))
     z[0, :4] = [0.1, 0.3, 0.0, 0.08]
     expected = _simulate(p, z[0].copy(), 5.0, 2e-3, instant=0, measured=3.0)
-    moved, _ = _move(p, z, 5.0, 2e-3, True, instant=0.0, measured=3.0)
+    moved, _ = _move(p, z, 5.0, 2e-3, instant=0.0, measured=3.0)
     np.testing.assert_allclose(moved[0, :2], expected[:2], rtol=1e-6, atol=1e-8)

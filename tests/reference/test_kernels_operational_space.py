@@ -5,17 +5,14 @@ import itertools
 import numpy as np
 import pytest
 
-from sealag.kernels.dense import invert_spd, jacobi_eigh, pseudo_inverse_psd
-from sealag.kernels.operational_space import (
-    FORCE,
-    PUBLISHED,
-    SYMMETRIC,
-    allocate,
-    invert_low_rank,
-    operational_space,
-    task_torque,
-)
+from helpers.kernels import from_python, solve_space, space_of
+from sealag.kernels import linalg, operational_space
+from sealag.kernels.operational_space import FORCE, PUBLISHED, SYMMETRIC
 
+invert_spd, jacobi_eigh = from_python(linalg.invert_spd), from_python(linalg.jacobi_eigh)
+pseudo_inverse_psd = from_python(linalg.pseudo_inverse_psd)
+invert_low_rank = from_python(linalg.invert_low_rank)
+task_torque = from_python(operational_space.task_torque)
 TOLERANCE = 1e-10
 
 
@@ -80,8 +77,8 @@ def test_matches_projectors_written_out(case, form, star):
     m = levels[-1]
     J_t, g = rng.normal(size=(m, nv)), rng.normal(size=nv)
     K_x = np.diag(rng.uniform(1, 100, m))
-    space = allocate(nv, n, c, m=m)
-    assert operational_space(M, g, J_s, J_t, K_x, np.array(levels), form, star, TOLERANCE, space)
+    space = space_of(nv, n, c, m=m)
+    assert solve_space(M, g, J_s, J_t, K_x, np.array(levels), form, star, TOLERANCE, space)
     J_star, S, UN_bar, gravity = plain_space(
         M, g, J_s, J_t, K_x, levels=levels, form=form, n=n, star=star
     )
@@ -97,10 +94,10 @@ def test_matches_projectors_written_out(case, form, star):
 
 
 def test_says_no_to_an_indefinite_mass_matrix():
-    space = allocate(2, 1, 0, m=1)
+    space = space_of(2, 1, 0, m=1)
     M = np.array([[1.0, 2.0], [2.0, 1.0]])
     args = (np.zeros(2), np.zeros((0, 2)), np.ones((1, 2)), np.eye(1), np.array([0, 1]))
-    assert not operational_space(M, *args, SYMMETRIC, False, TOLERANCE, space)
+    assert not solve_space(M, *args, SYMMETRIC, False, TOLERANCE, space)
 
 
 @pytest.mark.parametrize("rank", [0, 1, 4, 6])
@@ -179,9 +176,9 @@ def test_noise_in_a_lost_direction_falls_back_on_eigenvalues():
     once = rng.normal(size=(12, nv))
     J_s = np.vstack([once, once + 1e-13 * rng.normal(size=once.shape), once])
     J_t, g, K_x = rng.normal(size=(6, nv)), rng.normal(size=nv), np.eye(6)
-    space = allocate(nv, n, len(J_s), m=6)
+    space = space_of(nv, n, len(J_s), m=6)
     levels = np.array([0, 6])
-    assert operational_space(M, g, J_s, J_t, K_x, levels, FORCE, False, TOLERANCE, space)
+    assert solve_space(M, g, J_s, J_t, K_x, levels, FORCE, False, TOLERANCE, space)
     J_star, _, UN_bar, gravity = plain_space(
         M, g, J_s, J_t, K_x, levels=[0, 6], form=FORCE, n=n, star=False
     )

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sealag.actuation import actuators
+from sealag.kernels.ledger import COMMAND, DAMPING, MOTOR_WORK, PORT, SHAFT
 from sealag.robot import load_robot
 from sealag.simulation._plant import Plant
 
@@ -35,8 +36,8 @@ def test_a_step_against_an_adaptive_integrator(plant):
     robot, springs = plant.robot, plant.actuators
     K, B, D = springs.spring_stiffness, springs.shaped_inertia, springs.motor_damping
     tau = np.array([5.0, -20.0, 30.0, -5.0, 10.0, 15.0])
-    x = np.concatenate([plant.v, plant.theta, plant.theta_dot])
-    pieces, q = 20, plant.q.copy()
+    x = np.concatenate([plant.now.v, plant.now.theta, plant.now.theta_dot])
+    pieces, q = 20, plant.now.q.copy()
 
     def rate(t, x, q, v):
         there = robot.integrate(q, t * v + 0.5 * t * (x[:12] - v))  # the midpoint rule's place
@@ -52,22 +53,25 @@ def test_a_step_against_an_adaptive_integrator(plant):
         ).y[:, -1]  # fmt: skip
         q, x = robot.integrate(q, 0.5 * STEP / pieces * (v + end[:12])), end
     plant.advance(STEP, tau)
-    np.testing.assert_allclose(plant.q, q, atol=1e-8)
-    np.testing.assert_allclose(plant.v, x[:12], atol=1e-6)
-    np.testing.assert_allclose(plant.theta, x[12:18], atol=1e-8)
-    np.testing.assert_allclose(plant.theta_dot, x[18:], atol=1e-5)
+    np.testing.assert_allclose(plant.now.q, q, atol=1e-8)
+    np.testing.assert_allclose(plant.now.v, x[:12], atol=1e-6)
+    np.testing.assert_allclose(plant.now.theta, x[12:18], atol=1e-8)
+    np.testing.assert_allclose(plant.now.theta_dot, x[18:], atol=1e-5)
 
 
-def test_irregular_steps_are_the_same_steps(plant):
-    """Exponentials and works made for one step equal those of the tables."""
-    tau, measured = np.full(6, 7.0), np.zeros(6)
-    plant._try(STEP, True, tau, measured)
-    regular, work = plant._next.data.copy(), plant._work.copy()
-    plant._try(STEP, False, tau, measured)
-    plant._kernel.book_step(
-        plant._now.data, plant._next.data, plant._sizes, plant._memory,
-        plant._motors(tau, measured), STEP,
-    )  # fmt: skip
-    np.testing.assert_allclose(plant._next.data, regular, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(plant._work, work, rtol=1e-9, atol=1e-12)
-    assert (np.abs(work).max(axis=0) > 0.0).all()
+def test_two_halves_are_the_step(plant):
+    """Splitting a step changes nothing but what the integrator leaves, works included."""
+    tau = np.full(6, 7.0)
+    start = [part.copy() for part in plant.now]
+    plant.advance(STEP, tau)
+    whole, work = [part.copy() for part in plant.now], plant.ledger.joint.copy()
+    for part, first in zip(plant.now, start):
+        part[:] = first
+    plant.time, plant.ledger.joint[:] = 0.0, 0.0
+    for instant in (0.3 * STEP, STEP):
+        plant.advance(instant, tau)
+    for part, other in zip(plant.now, whole):
+        np.testing.assert_allclose(part, other, rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(plant.ledger.joint, work, rtol=1e-7, atol=1e-12)
+    moving = work[[PORT, SHAFT, MOTOR_WORK, COMMAND, DAMPING]]
+    assert (np.abs(moving).max(axis=1) > 0.0).all()

@@ -5,10 +5,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from sealag.kernels import walking, walking_law, walking_state
+from helpers.kernels import from_python
+from sealag.kernels import linalg, walking, walking_law, walking_state
 from sealag.robot import load_robot
 
 NV, N = 12, 6
+pendulum, constrain = from_python(walking.pendulum), from_python(walking_law.constrain)
+task_torques, least_squares = (
+    from_python(walking_law.task_torques), from_python(linalg.least_squares),
+)  # fmt: skip
+predict, stand = from_python(walking_state.predict), from_python(walking_state.stand)
 
 
 @pytest.fixture
@@ -56,16 +62,16 @@ def test_pendulum_against_an_adaptive_integrator():
 
     x, v = np.array([-0.12, 0.11]), np.array([0.6, -0.2])
     exact = solve_ivp(slope, (0.0, 0.35), np.concatenate([x, v]), rtol=1e-10, atol=1e-12).y[:, -1]
-    walking.pendulum(x, v, 0.0, 0.35, 0.06, old, new, height, 0.0, 16)
+    pendulum(x, v, 0.0, 0.35, 0.06, old, new, height, 0.0, 16)
     np.testing.assert_allclose(np.concatenate([x, v]), exact, atol=2e-3)
     fine = np.array([-0.12, 0.11]), np.array([0.6, -0.2])
-    walking.pendulum(*fine, 0.0, 0.35, 0.06, old, new, height, 0.0, 1600)
+    pendulum(*fine, 0.0, 0.35, 0.06, old, new, height, 0.0, 1600)
     np.testing.assert_allclose(np.concatenate(fine), exact, atol=1e-5)
 
 
 def _constrain(M, h, J, b):
     a_0, P = np.full(NV, np.nan), np.full((NV, N), np.nan)
-    walking_law.constrain(np.linalg.inv(M), h, J, b, a_0, P)
+    constrain(np.linalg.inv(M), h, J, b, a_0, P)
     return a_0, P
 
 
@@ -88,18 +94,18 @@ def test_task_torques_give_the_accelerations_wanted(terms):
     J_t, b_t, wanted = rng.standard_normal((N, NV)), rng.standard_normal(N), rng.standard_normal(N)
     a_0, P = _constrain(M, h, J[0], b[0])
     tau = np.full(N, np.nan)
-    walking_law.task_torques(a_0, P, J_t, b_t, wanted, 1e-14, tau)
+    task_torques(a_0, P, J_t, b_t, wanted, 1e-14, tau)
     np.testing.assert_allclose(J_t @ (a_0 + P @ tau) + b_t, wanted, atol=1e-8)
     J_t[5] = J_t[4]
-    walking_law.task_torques(a_0, P, J_t, b_t, wanted, 1e-6, tau)
+    task_torques(a_0, P, J_t, b_t, wanted, 1e-6, tau)
     assert np.abs(tau).max() < 1e5
 
 
-def test_damped_solve_against_its_plain_twin(terms):
+def test_damped_least_squares_against_its_plain_twin(terms):
     """(AᵀA + δ trace(AᵀA)) x = Aᵀ r."""
     A, r = terms[0], terms[4].standard_normal(NV)
     x, G = np.full(NV, np.nan), A.T @ A
-    walking_law.damped_solve(A, r, 1e-3, x)
+    least_squares(A, r, 1e-3, x)
     plain = np.linalg.solve(G + 1e-3 * np.trace(G) * np.eye(NV), A.T @ r)
     np.testing.assert_allclose(x, plain, rtol=1e-10)
 
@@ -146,7 +152,7 @@ def test_prediction_against_its_plain_twin(terms, begin, end):
         begin=begin, end=end,
     )  # fmt: skip
     speed, drive = v.copy(), motor.copy()
-    moved = walking_state.predict(
+    moved = predict(
         M, h, J, b, q, speed, drive, K, table, 0.0, 1e-3, 15, arrival, command, 10 % 8, begin, end
     )
     for got, wanted in zip((moved, speed, drive), expected, strict=True):
@@ -162,7 +168,7 @@ def test_foothold_against_its_plain_twin(side):
     gait = np.array([0.35, 0.06, 3.4, 3.3, 1.4, 0.2, 0.1, -0.15, 0.55, 0.12, 0.5, side])
     memory = np.array([[0.1, 0.05], [0.6, 0.2]])
     x, v = com[:2].copy(), speed[:2] + momentum
-    walking.pendulum(x, v, 0.1, 0.35, 0.06, old, new, height, 0.02, 16)
+    pendulum(x, v, 0.1, 0.35, 0.06, old, new, height, 0.02, 16)
     end = memory + 0.3 * (np.array([x, v]) - memory)
     u = (3.3 * (end[0] + end[1] / 3.4) - [0.2, -side * 0.1]) / (3.3 - 1.4)
     place = walking.capture_end(
@@ -211,7 +217,7 @@ def test_odometry_is_an_evaluation_at_the_corrected_state(hume, foot):
     robot, q, v, at = hume
     J, b, h, anchor = np.zeros((2, 6, NV)), np.zeros((2, 3)), np.zeros(NV), np.ones((2, 3))
     there, rate = q.copy(), v.copy()
-    walking_state.stand(at.terms, robot.frame_mounts(FEET), there, rate, h, foot, anchor, J, b)
+    stand(at.terms, robot.frame_mounts(FEET), there, rate, h, foot, anchor, J, b)
     plain = robot.workspace()
     plain.update(there, rate)
     np.testing.assert_allclose(plain.frame_placement(FEET[foot])[1], anchor[foot], atol=1e-12)
@@ -230,7 +236,7 @@ def test_extrapolation_and_springs(hume):
     there, rate, tau, K = q.copy(), v.copy(), np.zeros(N), np.full(N, 350.0)
     motor, ring = np.column_stack([q[-N:] + 0.1, v[-N:]]), (np.zeros(4), np.zeros((4, N)))
     walking_state.foresee(
-        robot.tree, at.terms, robot.frame_mounts(FEET), there, rate, motor, 0, -1,
+        tuple(robot.tree), tuple(at.terms), tuple(robot.frame_mounts(FEET)), there, rate, motor, 0, -1,
         np.zeros((2, 3)), K, np.zeros((N, 2, 4)), (0.0, 1e-3, 0.0, 0.0), -20, ring, 0, tau,
     )  # fmt: skip
     expected = robot.integrate(q, 0.02 * v)
@@ -250,11 +256,11 @@ def test_law_against_its_plain_twin(hume, phase):
     tau, rates, transfer = np.zeros(N), np.zeros(N), 0.06
     com = at.com, at.com_velocity, at.com_bias(), at.com_jacobian()
     assert walking_law.law(
-        at.terms, robot.frame_mounts(FEET), v, at.nle, False, height, swing, phase,
+        tuple(at.terms), tuple(robot.frame_mounts(FEET)), v, at.nle, False, height, swing, phase,
         (transfer, 0.1), 0, gains, tau, rates,
     )  # fmt: skip
     z = 0.9 + 0.01 + 0.002, 0.1 + 0.04, 0.4
-    R = at.terms[3][1]
+    R = at.terms.rotation[1]
     yaw = np.arctan2(R[1, 0], R[0, 0])
     heading = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
     spin = np.zeros((3, NV))

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from sealag.kernels.numerical_radius import numerical_radii, support
+from helpers.kernels import from_python
+from sealag.kernels import numerical_radius
+from sealag.kernels.numerical_radius import numerical_radii
+
+support = from_python(numerical_radius.support)
 
 
 def support_twin(A, phi):

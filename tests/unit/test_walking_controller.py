@@ -9,6 +9,7 @@ from humanoids2016._walk import FEET, WalkCase, simulate_walk
 from humanoids2016._walk_errors import NoisySensors, SensorNoise, wrong_robot
 from sealag.design import load
 from sealag.errors import InputError
+from helpers.kernels import from_python
 from sealag.kernels import walking
 from sealag.simulation import Outcome
 from sealag.walking import (
@@ -21,6 +22,8 @@ from sealag.walking import (
     walking_start,
 )
 from sealag.whole_body import Measurement
+
+PENDULUM = from_python(walking.pendulum)
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +42,9 @@ def test_periodic_gait_is_periodic(change):
     x, v = np.array([0.0, plan.apex_outward]), np.array([gait.apex_speed, 0.0])
     middle = 0.5 * (gait.step_time + gait.transfer_time)
     T, d = gait.step_time, gait.transfer_time
-    walking.pendulum(x, v, middle, T, d, old, new, height, 0.0, 4000)
+    PENDULUM(x, v, middle, T, d, old, new, height, 0.0, 4000)
     foot = np.array([plan.step_length, gait.step_width, 0.0])
-    walking.pendulum(x, v, 0.0, middle, d, new, foot, height, 0.0, 4000)
+    PENDULUM(x, v, 0.0, middle, d, new, foot, height, 0.0, 4000)
     np.testing.assert_allclose(x, [foot[0], foot[1] - plan.apex_outward], atol=1e-5)
     np.testing.assert_allclose(v, [gait.apex_speed, 0.0], atol=1e-5)
 

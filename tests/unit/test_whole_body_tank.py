@@ -17,15 +17,42 @@ from sealag.whole_body import (
     Task,
     TaskKind,
 )
-from sealag.whole_body._tank import EnergyTank
+from helpers.kernels import from_python
+from sealag.kernels import control_law
 
 STEP = 1e-3
 M, K, B_S, D, K_Q = 1.0, 350.0, 0.09, 10.0, 100.0
 BOUND = D / K_Q  # 1 / w with J*: the tank's x̂ is as soft as the motor angle
 
 
-def tank(*, size=3, energy=0.2, rate=5.0, delay_bound=0.05, flow=TankFlow.CORRECTED):
-    return EnergyTank(size=size, energy=energy, rate=rate, delay_bound=delay_bound, flow=flow)
+STEP_TANK = from_python(control_law.step_tank)
+
+
+class RunningTank:
+    """x̂ and the tank's energy, moved by the kernel of the controller."""
+
+    def __init__(self, *, size=3, energy=0.2, rate=5.0, delay_bound=0.05, flow=TankFlow.CORRECTED):
+        self.position, self._energy = np.zeros(size), np.full(1, energy)
+        none = np.zeros(0)
+        self._signal = control_law.Signal(
+            kind=control_law.TANK, sag=none, iterations=1, settled=0.0, diverged=0.0,
+            position=self.position, theta=none, energy=self._energy,
+            started=np.ones(1, np.int64), rate=rate, delay_bound=delay_bound,
+            corrected=flow is TankFlow.CORRECTED,
+        )  # fmt: skip
+
+    @property
+    def energy(self):
+        """Energy left, J."""
+        return float(self._energy[0])
+
+    def step(self, period, moved, *, wanted, target, stiffness):
+        """Move over a period."""
+        STEP_TANK(self._signal, period, moved, wanted, target, stiffness)
+
+
+def tank(**changes):
+    return RunningTank(**changes)
 
 
 def moves(seed, size=3, count=400):

@@ -6,13 +6,13 @@ Every foot is one or several points. A point's contact frame C has rows tangent,
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sealag.kernels._jit import entry, inner
 from sealag.kernels import friction
 from sealag.kernels.dynamics import Frames, Mounts, Terms, Tree, frame_terms, rigid_body_terms
 from sealag.kernels.friction import Equations, Surfaces
 from sealag.kernels.ledger import DISTURBANCE, HOLDING, SLIDING, TORSION
-from sealag.kernels.linalg import cholesky, forward_solve
+from sealag.kernels.linalg import cholesky, copy, forward_solve
 from sealag.kernels.motor import Motors
 from sealag.kernels.spatial import add, cross, dot, rotate, rotation, scale, vector
 from sealag.typing import Array, IntArray
@@ -82,14 +82,14 @@ class Work(NamedTuple):
     equations: Equations
 
 
-@njit(cache=True)
+@inner
 def plant_of(raw_plant):
     """Return the named parts of raw ones."""
     tree, mounts, motors, contacts = raw_plant
     return Plant(Tree(*tree), Mounts(*mounts), Motors(*motors), Contacts(*contacts))
 
 
-@njit(cache=True)
+@inner
 def surfaces_of(contacts):
     """Return the friction of the contact points."""
     return Surfaces(
@@ -98,7 +98,7 @@ def surfaces_of(contacts):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@inner
 def allocate_work(plant, terms):
     """Return memory for evaluations of a plant."""
     nv, contacts = terms.nle.size, plant.contacts
@@ -111,7 +111,7 @@ def allocate_work(plant, terms):
     return Work(terms, frames, np.zeros((total, 3, nv)), np.zeros((total, 3)), equations)
 
 
-@njit(cache=True)
+@inner
 def _place_points(contacts, at, work):
     """Write Jacobian, position, velocity and acceleration at zero v̇ of every point."""
     nv = at.v.size
@@ -136,7 +136,7 @@ def _place_points(contacts, at, work):
         )  # fmt: skip
 
 
-@njit(cache=True)
+@inner
 def _apply(plant, at, work):
     """Write spring torques, L⁻¹ times all forces but the contacts', and the loads' power."""
     motors, contacts, free = plant.motors, plant.contacts, work.equations.free
@@ -159,7 +159,7 @@ def _apply(plant, at, work):
     forward_solve(work.equations.L, free)
 
 
-@njit(cache=True)
+@inner
 def _demand(contacts, at, work):
     """Write the part of every point's contact equation that is not J v̇ (P, 3).
 
@@ -177,7 +177,7 @@ def _demand(contacts, at, work):
         target[i, 2] = dot(normal, add(drift, back))
 
 
-@njit(cache=True)
+@inner
 def project(L, J, C, wanted, rows):
     """Write L⁻¹ (C J)ᵀ of every wanted (P,) point, as rows (P, 3, nv)."""
     nv = L.shape[0]
@@ -192,7 +192,7 @@ def project(L, J, C, wanted, rows):
             forward_solve(L, rows[i, a])
 
 
-@njit(cache=True)
+@inner
 def _twist(contacts, v, work):
     """Write L⁻¹ Jᵀ of the turn about the normal of feet with torsional damping, and its rate."""
     eq = work.equations
@@ -212,7 +212,7 @@ def _twist(contacts, v, work):
         forward_solve(eq.L, eq.twist_rows[f])
 
 
-@njit(cache=True)
+@inner
 def _write_powers(contacts, at, work):
     """Write the powers of the contacts' forces and the energy of the links."""
     power, eq = at.power, work.equations
@@ -225,10 +225,10 @@ def _write_powers(contacts, at, work):
             power[SLIDING] += along * dot(first, speed) + across * dot(second, speed)
     for f in range(eq.spin.size):
         power[TORSION] += eq.torque[f] * eq.spin[f]
-    at.energy[:] = work.terms.energy
+    copy(work.terms.energy, at.energy)
 
 
-@njit(cache=True)
+@inner
 def _prepare(plant, at, work):
     """Write everything at an instant that its contact forces follow from; False if M is singular."""
     rigid_body_terms(plant.tree, at.q, at.v, work.terms)
@@ -242,7 +242,7 @@ def _prepare(plant, at, work):
     return True
 
 
-@njit(cache=True)
+@inner
 def accelerate(plant, at, work):
     """Write spring torques, contact forces and acceleration at an instant, from its state.
 
@@ -260,14 +260,14 @@ def accelerate(plant, at, work):
     return solved
 
 
-@njit(cache=True)
+@entry
 def evaluate(raw_plant, raw_terms, raw_now):
     """Evaluate dynamics and contact forces at an instant; False if there is no solution."""
     plant = plant_of(raw_plant)
     return accelerate(plant, Instant(*raw_now), allocate_work(plant, Terms(*raw_terms)))
 
 
-@njit(cache=True)
+@entry
 def resolve(raw_plant, raw_terms, raw_now, touching, impact, impulse):
     """Find which touching points stay closed, by an impact or under the forces of an instant.
 
@@ -310,11 +310,11 @@ def resolve(raw_plant, raw_terms, raw_now, touching, impact, impulse):
             half, J = 0.5 * (now.v[c] + x[c]), work.J[i]
             mean = add(mean, scale(half, (J[0, c], J[1, c], J[2, c])))
         lost -= dot(rotate(rotation(contacts.C, i), mean), vector(impulse, i))
-    now.v[:] = x
+    copy(x, now.v)
     return status, lost
 
 
-@njit(cache=True)
+@inner
 def ground_height(contacts, x):
     """Return the height of the ground's profile at x, m: linear between places, level beyond."""
     places, heights = contacts.ground_x, contacts.ground_z
@@ -327,7 +327,7 @@ def ground_height(contacts, x):
     return heights[k - 1] + slope * (x - places[k - 1])
 
 
-@njit(cache=True)
+@inner
 def measure_gaps(contacts, at):
     """Write the gaps of all points over the ground's profile."""
     for i in range(contacts.closed.size):
@@ -341,7 +341,7 @@ def measure_gaps(contacts, at):
         at.gap[i] = height - contacts.floor[i]
 
 
-@njit(cache=True)
+@inner
 def smallest_margin(contacts, at):
     """Return the smallest margin and its point: how far it is from ending its condition.
 
@@ -359,13 +359,13 @@ def smallest_margin(contacts, at):
     return smallest, point
 
 
-@njit(cache=True)
+@entry
 def margin(raw_contacts, raw_now):
     """Return the smallest margin of an instant and its point, see `smallest_margin`."""
     return smallest_margin(Contacts(*raw_contacts), Instant(*raw_now))
 
 
-@njit(cache=True)
+@inner
 def write_measurement(at, contacts, t, row):
     """Write what the sensors measure at an instant.
 
@@ -378,7 +378,7 @@ def write_measurement(at, contacts, t, row):
     """
     row[0], place = t, 1
     for part in (at.q, at.v, at.theta, at.theta_dot, at.tau_sea):
-        row[place : place + part.size] = part
+        copy(part, row[place : place + part.size])
         place += part.size
     row[place:] = 0.0
     for i in range(contacts.closed.size):
@@ -386,7 +386,7 @@ def write_measurement(at, contacts, t, row):
             row[place + contacts.frame[i]] = 1.0
 
 
-@njit(cache=True)
+@entry
 def sense(raw_contacts, raw_now, t, row):
     """Write what the sensors measure at an instant, see `write_measurement`."""
     write_measurement(Instant(*raw_now), Contacts(*raw_contacts), t, row)

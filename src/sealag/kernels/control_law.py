@@ -4,8 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sealag.kernels._jit import entry, inner
 from sealag.kernels.dynamics import (
     Frames,
     Mounts,
@@ -15,7 +15,7 @@ from sealag.kernels.dynamics import (
     gravity_hessian,
     rigid_body_terms,
 )
-from sealag.kernels.linalg import eliminate, multiply
+from sealag.kernels.linalg import copy, eliminate, multiply
 from sealag.kernels.operational_space import (
     Space,
     divide,
@@ -26,7 +26,8 @@ from sealag.kernels.spatial import integrate
 from sealag.typing import Array, IntArray
 
 OF_FRAME, OF_MASS, OF_JOINT = 0, 1, 2  # what a task row measures
-EXISTS, SINGULAR_MASS, NO_STATIC_STATE = range(3)  # how `static` ends
+MEASURED, STATIC, TANK = range(3)  # the law is taken at given angles, at q̄(θ), at x̂
+EXISTS, SINGULAR_MASS, NO_STATIC_STATE = range(3)  # how `tick` ends
 _PIVOT = 1e-12
 """Of a spring: pivots below count as none. Rounding leaves 1e-15; a law within 1e-12 of its springs'
 stiffness has no use."""
@@ -97,18 +98,24 @@ class Control(NamedTuple):
     space: Space
 
 
-class Reservoir(NamedTuple):
-    """The energy tank and x̂, see `sealag.whole_body.EnergyTank`."""
+class Signal(NamedTuple):
+    """The running signal: where the law is taken, and what is carried from tick to tick."""
 
+    kind: int  # MEASURED, STATIC or TANK
+    sag: Array  # (n,) q̄ − θ, where the search for q̄(θ) begins, rad
+    iterations: int  # Newton steps towards q̄(θ) at most
+    settled: float  # rad; a smaller step is the last
+    diverged: float  # rad; a larger step means no solution nearby
     position: Array  # (m,) x̂, from the posture's own
-    theta: Array  # (n,) motor angles at the last step, rad
-    energy: Array  # (1,) J
+    theta: Array  # (n,) motor angles at the tank's last step, rad
+    energy: Array  # (1,) of the tank, J
+    started: IntArray  # (1,) whether x̂ is somewhere
     rate: float  # at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s
-    delay_bound: float  # s
+    delay_bound: float  # s, that the tank pays for
     corrected: bool  # whether the tank pays for u's work on the potential
 
 
-@njit(cache=True)
+@inner
 def control_of(raw_control):
     """Return the named parts of raw ones; the last is the memory of the space."""
     tree, mounts, tasks, gains, terms, frames, at, newton, memory = raw_control
@@ -122,13 +129,47 @@ def control_of(raw_control):
     )  # fmt: skip
 
 
-@njit(cache=True)
-def law(raw_control, q, joints, out):
-    """Write the law's torque at given joint angles, see `evaluate`."""
-    return evaluate(control_of(raw_control), q, joints, out)
+@entry
+def tick(raw_control, raw_signal, period, q, angles, out):
+    """Write the law's torque.
+
+    Args:
+        raw_control: the law; where it was last evaluated is written.
+        raw_signal: `Signal`, moved.
+        period: since the last tick, s; a tank pays for it.
+        q: (nq,) measured configuration.
+        angles: (n,) joint angles if the signal is MEASURED, else motor angles, rad.
+        out: (n,) torque, Nm, written.
+
+    Returns:
+        EXISTS, SINGULAR_MASS or NO_STATIC_STATE.
+    """
+    control, signal = control_of(raw_control), Signal(*raw_signal)
+    status, iterations = EXISTS, 1 if signal.kind == MEASURED else signal.iterations
+    joints, settled = angles.copy(), False
+    for _ in range(iterations):
+        if signal.kind != MEASURED:
+            for i in range(angles.size):
+                joints[i] = angles[i] + signal.sag[i]
+        if not evaluate(control, q, joints, out):
+            return SINGULAR_MASS
+        if signal.kind != MEASURED:
+            status, settled = approach_static_state(control, signal, out)
+        if settled or status != EXISTS:
+            break
+    if status != EXISTS or signal.kind == MEASURED:
+        return status
+    _end_search(control, signal, out)
+    if signal.kind == TANK:
+        target = control.at.wanted - control.at.error
+        # Compensation that is fed back is taken at θ, whose gradient it has.
+        if control.gains.fed_back and not evaluate(control, q, angles, out):
+            return SINGULAR_MASS
+        _follow(control, signal, period, angles, target, out)
+    return EXISTS
 
 
-@njit(cache=True)
+@inner
 def evaluate(control, q, joints, out):
     """Write the torque J*ᵀ S x̃ + ḡ at given joint angles, and everything that it is made of.
 
@@ -158,7 +199,7 @@ def evaluate(control, q, joints, out):
     rigid_body_terms(tree, at.q, at.shift, terms)  # at rest
     frame_terms(terms, control.mounts, control.frames)
     for r in range(tasks.contact_frame.size):
-        at.J_s[r] = control.frames.J[tasks.contact_frame[r], tasks.contact_row[r]]
+        copy(control.frames.J[tasks.contact_frame[r], tasks.contact_row[r]], at.J_s[r])
     _read_tasks(tasks, terms, control.frames, at)
     if not operational_space(
         terms.M, terms.nle, at.J_s, at.J_t, gains.K_x, tasks.levels, gains.form, gains.star,
@@ -175,7 +216,7 @@ def evaluate(control, q, joints, out):
     return True
 
 
-@njit(cache=True)
+@inner
 def _write_torque(control, out):
     """Write the torque of the errors and matrices that stand here now."""
     space, gains = control.space, control.gains
@@ -183,13 +224,13 @@ def _write_torque(control, out):
     task_torque(space.J_star, space.stiffness, control.at.error, gravity, out)
 
 
-@njit(cache=True)
+@entry
 def torque(raw_control, out):
     """Write the torque (n,) of the errors and matrices that stand here now."""
     _write_torque(control_of(raw_control), out)
 
 
-@njit(cache=True)
+@inner
 def _read_tasks(tasks, terms, frames, at):
     """Write Jacobians and errors of all task rows."""
     both, last = np.empty(6), -1
@@ -201,15 +242,17 @@ def _read_tasks(tasks, terms, frames, at):
             if frame != last:
                 frame_error(tasks.R[frame], tasks.p[frame], frames.R[frame], frames.p[frame], both)
                 last = frame
-            at.J_t[r], at.error[r] = frames.J[frame, row], both[row]
+            copy(frames.J[frame, row], at.J_t[r])
+            at.error[r] = both[row]
         elif kind == OF_MASS:
-            at.J_t[r], at.error[r] = terms.com_jacobian[row], tasks.x[r] - terms.com[row]
+            copy(terms.com_jacobian[row], at.J_t[r])
+            at.error[r] = tasks.x[r] - terms.com[row]
         else:
             at.J_t[r], at.error[r] = 0.0, tasks.x[r] - at.q[first_q + row]
             at.J_t[r, base + row] = 1.0
 
 
-@njit(cache=True)
+@entry
 def leave_to_higher(J_t, lift, levels, error, motion):
     """Take out of each task's error what the tasks above it will remove, in place.
 
@@ -234,7 +277,7 @@ def leave_to_higher(J_t, lift, levels, error, motion):
                 motion[i] += lift[r, i] * error[r]
 
 
-@njit(cache=True)
+@inner
 def frame_error(R_wanted, p_wanted, R, p, out):
     """Position and rotation that lead from a frame's placement to the wanted one, world axes.
 
@@ -265,7 +308,7 @@ def frame_error(R_wanted, p_wanted, R, p, out):
         out[i] = p_wanted[i] - p[i]
 
 
-@njit(cache=True)
+@inner
 def _turn_about(R_wanted, R, cosine, angle, out):
     """out[3:] = angle · axis near half a turn, from E + Eᵀ = 2 cos I + 2 (1 − cos) a aᵀ.
 
@@ -291,7 +334,7 @@ def _turn_about(R_wanted, R, cosine, angle, out):
         out[3 + i] *= scale
 
 
-@njit(cache=True)
+@inner
 def gravity_slope(tree, terms, along, newton):
     """Write ∂ḡ/∂q_j along the contact-consistent motions, with these motions frozen: Wᵀ H W.
 
@@ -311,7 +354,7 @@ def gravity_slope(tree, terms, along, newton):
                 newton.slope[i, j] += along[k, i] * newton.moved[k, j]
 
 
-@njit(cache=True)
+@inner
 def static_step(J_star, stiffness, springs, torque, sag, newton):
     """One Newton step towards K (θ − q̄) = l(q̄), Eqs. (15), (16), with sag = q̄ − θ.
 
@@ -331,7 +374,7 @@ def static_step(J_star, stiffness, springs, torque, sag, newton):
     """
     m, n = J_star.shape
     square, step = newton.square, newton.step
-    square[:, :] = newton.slope
+    copy(newton.slope, square)
     for r in range(m):
         for s in range(m):
             entry = stiffness[r, s]
@@ -350,107 +393,98 @@ def static_step(J_star, stiffness, springs, torque, sag, newton):
     return True
 
 
-@njit(cache=True)
+@inner
 def _write_error_jacobian(control):
     """Write minus the errors' Jacobian by joint angles, where the law was last evaluated."""
     if control.gains.consistent:
-        control.newton.J[:] = control.space.J_star
+        copy(control.space.J_star, control.newton.J)
     else:
         multiply(control.at.J_t, control.space.joint_from_base, control.newton.J)
 
 
-@njit(cache=True)
-def static(raw_control, q, theta, sag, iterations, settled, diverged, out):
-    """Evaluate the law at q̄(θ), see `find_static_state`."""
-    control = control_of(raw_control)
-    return find_static_state(control, q, theta, sag, iterations, settled, diverged, out)
-
-
-@njit(cache=True)
-def find_static_state(control, q, theta, sag, iterations, settled, diverged, out):
-    """Evaluate the law at q̄(θ) of Eqs. (15), (16), by Newton's method.
-
-    The springs carry the law there, l(q̄) = K (θ − q̄) = −K sag, so that the last step needs no
-    new evaluation.
+@inner
+def approach_static_state(control, signal, torque):
+    """Do a Newton step towards q̄(θ) of Eqs. (15), (16) from where the law was evaluated.
 
     Args:
-        control: the law.
-        q: (nq,) measured configuration.
-        theta: (n,) motor angles, rad.
-        sag: (n,) q̄ − θ, a first guess that is moved.
-        iterations: at most.
-        settled: rad; a smaller step is the last.
-        diverged: rad; a larger step means no solution nearby.
-        out: (n,) torque, Nm, written.
+        control: the law, evaluated at θ + sag.
+        signal: its sag is moved.
+        torque: (n,) of the law there, Nm.
 
     Returns:
-        EXISTS, SINGULAR_MASS or NO_STATIC_STATE.
+        EXISTS or NO_STATIC_STATE, and whether this was the last step.
     """
-    gains, at, newton, space = control.gains, control.at, control.newton, control.space
-    joints = np.empty(theta.size)
-    for _ in range(iterations):
-        for i in range(theta.size):
-            joints[i] = theta[i] + sag[i]
-        if not evaluate(control, q, joints, out):
-            return SINGULAR_MASS
-        if gains.fed_back:
-            gravity_slope(control.tree, control.terms, space.joint_from_base, newton)
-        _write_error_jacobian(control)
-        exists = static_step(space.J_star, space.stiffness, gains.springs, out, sag, newton)
-        size = 0.0
-        for i in range(theta.size):
-            size = max(size, abs(newton.step[i]))
-        if not (exists and size < diverged):
-            return NO_STATIC_STATE
-        if size < settled:
-            break
-    for i in range(theta.size):
-        out[i] = -gains.springs[i] * sag[i]
+    gains, newton, space = control.gains, control.newton, control.space
+    if gains.fed_back:
+        gravity_slope(control.tree, control.terms, space.joint_from_base, newton)
+    _write_error_jacobian(control)
+    exists = static_step(space.J_star, space.stiffness, gains.springs, torque, signal.sag, newton)
+    size = np.abs(newton.step).max()
+    if not (exists and size < signal.diverged):
+        return NO_STATIC_STATE, True
+    return EXISTS, size < signal.settled
+
+
+@inner
+def _end_search(control, signal, out):
+    """Write torque and error at q̄: the springs carry the law there, l(q̄) = K (θ − q̄) = −K sag, so
+    that the last step needs no new evaluation."""
+    at, newton = control.at, control.newton
+    for i in range(out.size):
+        out[i] = -control.gains.springs[i] * signal.sag[i]
     for r in range(at.error.size):
-        for i in range(theta.size):
+        for i in range(out.size):
             at.error[r] -= newton.J[r, i] * newton.step[i]
-    return EXISTS
 
 
-@njit(cache=True)
-def pay(raw_control, raw_reservoir, period, theta, target, out):
-    """Move x̂ over one period and the tank's energy with it, and write the torque at x̂.
+@inner
+def step_tank(tank, period, moved, wanted, target, stiffness):
+    """Move x̂ over one period, and the tank's energy with it.
 
     Args:
-        raw_control: the law, evaluated where J* and S are taken.
-        raw_reservoir: `Reservoir`, moved.
+        tank: moved.
         period: T since the last step, s; at 0 or less u does nothing.
-        theta: (n,) motor angles, rad.
+        moved: (m,) J* Δθ.
+        wanted: (m,) x_d.
         target: (m,) x(q̄(θ)), which u moves x̂ to.
-        out: (n,) torque, Nm, written.
+        stiffness: (m, m) S, symmetric.
     """
-    control, tank = control_of(raw_control), Reservoir(*raw_reservoir)
-    at, S = control.at, control.space.stiffness
-    m, n = control.space.J_star.shape
-    moved, u = np.zeros(m), np.zeros(m)
-    for r in range(m):
-        for i in range(n):
-            moved[r] += control.space.J_star[r, i] * (theta[i] - tank.theta[i])
+    m, flow, x = moved.size, 0.0, tank.position
     if period > 0.0:
         # u of the exact solution of x̂̇ = rate (target − x̂), so that no period is too long.
         pull = -math.expm1(-tank.rate * period) / period
-        flow = 0.0
+        u = np.empty(m)
         for r in range(m):
-            u[r] = pull * (target[r] - tank.position[r] - moved[r])
+            u[r] = pull * (target[r] - x[r] - moved[r])
         for r in range(m):
-            force = 0.0
+            force, half = 0.0, 0.5 * (period * u[r] + moved[r])
             for s in range(m):
-                force += S[r, s] * u[s]
-            flow -= tank.delay_bound * force * (0.5 * period * u[r] + moved[r])
+                force += stiffness[r, s] * u[s]
+            flow -= tank.delay_bound * force * (half + 0.5 * moved[r])
             if tank.corrected:
-                half = at.wanted[r] - tank.position[r] - 0.5 * (period * u[r] + moved[r])
-                flow += period * force * half
+                flow += period * force * (wanted[r] - x[r] - half)
         if tank.energy[0] + flow >= 0.0:
             tank.energy[0] += flow
             for r in range(m):
-                tank.position[r] += period * u[r]
-    tank.theta[:] = theta
+                x[r] += period * u[r]
     for r in range(m):
-        tank.position[r] += moved[r]
-        at.error[r] = at.wanted[r] - tank.position[r]
+        x[r] += moved[r]
+
+
+@inner
+def _follow(control, signal, period, theta, target, out):
+    """Let x̂ follow its target as far as the tank pays, and write the law's torque at x̂."""
+    at, J_star = control.at, control.space.J_star
+    if signal.started[0]:
+        moved = np.zeros(target.size)
+        for r in range(target.size):
+            for i in range(theta.size):
+                moved[r] += J_star[r, i] * (theta[i] - signal.theta[i])
+        step_tank(signal, period, moved, at.wanted, target, control.space.stiffness)
+    else:
+        copy(target, signal.position)
+        signal.started[0] = 1
+    copy(theta, signal.theta)
+    for r in range(target.size):
+        at.error[r] = at.wanted[r] - signal.position[r]
     _write_torque(control, out)

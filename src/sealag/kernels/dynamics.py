@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sealag.kernels._jit import entry, inner
 from sealag.kernels.spatial import (
     add,
     angular,
@@ -126,13 +126,13 @@ def allocate_frames(count: int, nv: int) -> Frames:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@entry
 def evaluate(raw_tree, q, v, raw_terms):
     """Write the terms of a robot at q (nq,), v (nv,)."""
     rigid_body_terms(Tree(*raw_tree), q, v, Terms(*raw_terms))
 
 
-@njit(cache=True)
+@inner
 def rigid_body_terms(tree, q, v, terms):
     """Write the terms of a robot.
 
@@ -159,7 +159,7 @@ def rigid_body_terms(tree, q, v, terms):
     _sum_up(bodies, v, terms)
 
 
-@njit(cache=True)
+@inner
 def _place(tree, q, j, terms):
     """Write rotation and position of joint j."""
     kind, parent = tree.kind[j], tree.parent[j]
@@ -181,7 +181,7 @@ def _place(tree, q, j, terms):
     put_vector(terms.position, j, p)
 
 
-@njit(cache=True)
+@inner
 def _write_columns(tree, j, terms):
     """Write the columns of joint j's Jacobian, world axes, per rate of its coordinate."""
     kind, first, R = tree.kind[j], tree.column[j], rotation(terms.rotation, j)
@@ -203,7 +203,7 @@ def _write_columns(tree, j, terms):
         put_twist(terms.columns, first, cross(arm, along), along)
 
 
-@njit(cache=True)
+@inner
 def _move(tree, v, j, terms):
     """Write velocity and acceleration at zero v̇ of joint j."""
     first, at, parent = tree.column[j], tree.coordinate[j], tree.parent[j]
@@ -222,7 +222,7 @@ def _move(tree, v, j, terms):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@inner
 def _weigh(tree, terms, j, bodies):
     """Write body j's mass, moment, inertia, force and momentum about the common point."""
     mass, R = tree.mass[j], rotation(terms.rotation, j)
@@ -249,7 +249,7 @@ def _weigh(tree, terms, j, bodies):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@inner
 def _momentum(bodies, j, move, turn):
     """Return linear and angular momentum of what moves behind joint j with a twist."""
     moment = vector(bodies.moment, j)
@@ -257,7 +257,7 @@ def _momentum(bodies, j, move, turn):
     return push, add(rotate(rotation(bodies.inertia, j), turn), cross(moment, move))
 
 
-@njit(cache=True)
+@inner
 def _gather(tree, bodies, terms):
     """Write M, nle and the centre of mass's Jacobian times the mass, from the leaves inwards."""
     M, nle, columns, mass_jacobian = terms.M, terms.nle, terms.columns, terms.com_jacobian
@@ -295,11 +295,13 @@ def _gather(tree, bodies, terms):
             bodies.momentum[parent, k] += bodies.momentum[j, k]
 
 
-@njit(cache=True)
+@inner
 def _sum_up(bodies, v, terms):
     """Write centre of mass, its Jacobian, momentum and energy of the whole robot."""
     mass = bodies.mass[0]
-    terms.com_jacobian[:] /= mass
+    for a in range(3):
+        for c in range(v.size):
+            terms.com_jacobian[a, c] /= mass
     away = scale(1.0 / mass, vector(bodies.moment, 0))
     push, force = linear(bodies.momentum, 0), linear(bodies.force, 0)
     terms.com[0], terms.com[1], terms.com[2] = add(vector(terms.position, 1), away)
@@ -317,13 +319,13 @@ def _sum_up(bodies, v, terms):
         terms.energy[KINETIC] += 0.5 * v[i] * row
 
 
-@njit(cache=True)
+@entry
 def frames(raw_terms, raw_mounts, raw_frames):
     """Write Jacobian, rotation, position and J̇ v of frames."""
     frame_terms(Terms(*raw_terms), Mounts(*raw_mounts), Frames(*raw_frames))
 
 
-@njit(cache=True)
+@inner
 def frame_terms(terms, mounts, frames):
     """Write Jacobian, rotation, position and J̇ v of frames.
 
@@ -360,13 +362,13 @@ def frame_terms(terms, mounts, frames):
             J[5, c] += wz
 
 
-@njit(cache=True)
+@entry
 def gravity_gradient(raw_tree, raw_terms, H):
     """Write ∂²V/∂q² (nv, nv), see `gravity_hessian`."""
     gravity_hessian(Tree(*raw_tree), Terms(*raw_terms), H)
 
 
-@njit(cache=True)
+@inner
 def gravity_hessian(tree, terms, H):
     """Write how the gravity torque changes with the configuration, ∂²V/∂q².
 

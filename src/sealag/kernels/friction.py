@@ -14,9 +14,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from sealag.kernels.linalg import backward_solve, cholesky, forward_solve
+from sealag.kernels._jit import inner
+from sealag.kernels.linalg import backward_solve, cholesky, copy, forward_solve
 from sealag.typing import Array, IntArray
 
 SETTLED, INCONSISTENT, UNSOLVABLE = 0, 1, 2  # how `settle` ends
@@ -61,7 +61,7 @@ class Equations(NamedTuple):
     high: Array  # (P,)
 
 
-@njit(cache=True)
+@inner
 def allocate_equations(nv, points, feet):
     """Return memory for the contact equations of points on feet."""
     size = 3 * points
@@ -75,7 +75,7 @@ def allocate_equations(nv, points, feet):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@inner
 def _assemble(eq, x, closed, surfaces):
     """Write the contact equations G f = right of all closed points; return their number of rows."""
     size = 0
@@ -104,7 +104,7 @@ def _assemble(eq, x, closed, surfaces):
     return size
 
 
-@njit(cache=True)
+@inner
 def _friction(eq, size, mu, yielding):
     """Solve (G + diag(yielding)) f = right with yielding >= 0 such that every cone holds.
 
@@ -149,7 +149,7 @@ def _friction(eq, size, mu, yielding):
     return True
 
 
-@njit(cache=True)
+@inner
 def _newton(eq, f, r, mu, yielding):
     """Newton iterate for mu f_n / |f_t| = 1 of the point whose normal row is r; inf if none."""
     tangent = math.hypot(f[r - 2], f[r - 1])
@@ -168,7 +168,7 @@ def _newton(eq, f, r, mu, yielding):
     return yielding + (1.0 - ratio) / rate
 
 
-@njit(cache=True)
+@inner
 def _inside(guess, low, high, scale):
     """Keep an iterate inside its bracket, else divide the bracket geometrically."""
     if low < guess < high or (guess == 0.0 and low == 0.0):
@@ -178,7 +178,7 @@ def _inside(guess, low, high, scale):
     return math.sqrt(max(low, 1e-12 * high) * high)
 
 
-@njit(cache=True)
+@inner
 def _twist(eq, force, closed, surfaces):
     """Write -clip(damping spin) within the radius times the normal load; return the change."""
     change = 0.0
@@ -194,7 +194,7 @@ def _twist(eq, force, closed, surfaces):
     return change
 
 
-@njit(cache=True)
+@inner
 def solve(eq, surfaces, closed, yielding, x, force):
     """Meet the contact conditions of the closed points.
 
@@ -212,7 +212,7 @@ def solve(eq, surfaces, closed, yielding, x, force):
     eq.torque[:] = 0.0
     _twist(eq, force, closed, surfaces)
     for _ in range(_ITERATIONS):
-        x[:] = eq.free
+        copy(eq.free, x)
         for k in range(eq.spin.size):
             if eq.torque[k] != 0.0:
                 for c in range(x.size):
@@ -232,7 +232,7 @@ def solve(eq, surfaces, closed, yielding, x, force):
     return True
 
 
-@njit(cache=True)
+@inner
 def settle(eq, surfaces, touching, closed, yielding, tolerance, x, force):
     """Find which touching points are closed, so that none pulls and none sinks in.
 
@@ -273,7 +273,7 @@ def settle(eq, surfaces, touching, closed, yielding, tolerance, x, force):
     return INCONSISTENT
 
 
-@njit(cache=True)
+@inner
 def _along(eq, i, x):
     """Normal component of J x, from rows = L⁻¹ (C J)ᵀ: (Lᵀ x) · rows."""
     s = 0.0

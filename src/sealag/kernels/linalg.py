@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from sealag.kernels._jit import inner
 
 _ROUNDING = 1e-13
 """Of the trace: what a Cholesky factorisation leaves. Ten times smaller takes rounding for rank; ten
@@ -12,7 +13,19 @@ _WORST_CONDITION = 1e4
 """Up to which A⁺ through G⁻² loses no more than six digits; ten times more loses eight."""
 
 
-@njit(cache=True)
+@inner
+def copy(source, target):
+    """target = source, of the same shape and one or two dimensions."""
+    if source.ndim == 1:
+        for i in range(source.shape[0]):
+            target[i] = source[i]
+    else:
+        for i in range(source.shape[0]):
+            for j in range(source.shape[1]):
+                target[i, j] = source[i, j]
+
+
+@inner
 def multiply(A, B, out):
     """out = A B for C-contiguous A (m, k), B (k, n), out (m, n)."""
     m, k = A.shape
@@ -27,7 +40,7 @@ def multiply(A, B, out):
                     out[i, j] += a * B[p, j]
 
 
-@njit(cache=True)
+@inner
 def multiply_transposed(A, B, out):
     """out = A Bᵀ for A (m, k), B (n, k), out (m, n)."""
     m, k = A.shape
@@ -40,7 +53,7 @@ def multiply_transposed(A, B, out):
             out[i, j] = total
 
 
-@njit(cache=True)
+@inner
 def cholesky(A, L):
     """Write the lower factor L of A = L Lᵀ (n, n); False if A is not positive definite."""
     n = A.shape[0]
@@ -58,7 +71,7 @@ def cholesky(A, L):
     return True
 
 
-@njit(cache=True)
+@inner
 def forward_solve(L, x):
     """x ← L⁻¹ x in place, L (≥ n, ≥ n) lower triangular, x (n,)."""
     for i in range(x.size):
@@ -68,7 +81,7 @@ def forward_solve(L, x):
         x[i] = s / L[i, i]
 
 
-@njit(cache=True)
+@inner
 def backward_solve(L, x):
     """x ← L⁻ᵀ x in place, L (≥ n, ≥ n) lower triangular, x (n,)."""
     for i in range(x.size - 1, -1, -1):
@@ -78,7 +91,7 @@ def backward_solve(L, x):
         x[i] = s / L[i, i]
 
 
-@njit(cache=True)
+@inner
 def invert_spd(A, out, factor):
     """out = A⁻¹ of a symmetric positive definite A (n, n) by Cholesky; False if it is not.
 
@@ -104,7 +117,7 @@ def invert_spd(A, out, factor):
     return True
 
 
-@njit(cache=True)
+@inner
 def jacobi_eigh(A, values, vectors):
     """Eigenvalues and eigenvectors (columns) of a symmetric A (n, n); A is overwritten.
 
@@ -130,7 +143,7 @@ def jacobi_eigh(A, values, vectors):
         values[i] = A[i, i]
 
 
-@njit(cache=True)
+@inner
 def _rotate(A, vectors, p, q):
     if A[p, q] == 0.0:
         return
@@ -152,7 +165,7 @@ def _rotate(A, vectors, p, q):
         vectors[k, p], vectors[k, q] = c * a - s * b, s * a + c * b
 
 
-@njit(cache=True)
+@inner
 def pseudo_inverse_psd(A, threshold, out, root, values, vectors):
     """out = A⁺ and root = (A⁺)^½ of a symmetric positive semidefinite A (n, n); A is overwritten.
 
@@ -181,7 +194,7 @@ def pseudo_inverse_psd(A, threshold, out, root, values, vectors):
     return rank
 
 
-@njit(cache=True)
+@inner
 def _factor(A, L, left):
     """A = L Lᵀ by Cholesky with pivots, rows of Lᵀ (r, n) in ``L``; r, and the trace of A.
 
@@ -199,7 +212,7 @@ def _factor(A, L, left):
                 p = i
         if not left[p] > _ROUNDING * max(trace, 0.0):
             return r, trace
-        L[r] = A[p]
+        copy(A[p], L[r])
         for k in range(r):
             factor = L[k, p]
             for i in range(n):
@@ -213,7 +226,7 @@ def _factor(A, L, left):
 
 
 
-@njit(cache=True)
+@inner
 def invert_low_rank(A, threshold, out, scratch, values):
     """out = A⁺ of a symmetric positive semidefinite A (n, n), if that is safe without eigenvalues.
 
@@ -256,7 +269,7 @@ def invert_low_rank(A, threshold, out, scratch, values):
 
 
 
-@njit(cache=True)
+@inner
 def pseudo_inverse(A, threshold, out, scratch, values):
     """out = A⁺; eigenvalues only where `invert_low_rank` gives no answer. A is overwritten."""
     if invert_low_rank(A, threshold, out, scratch, values) < 0:
@@ -264,7 +277,7 @@ def pseudo_inverse(A, threshold, out, scratch, values):
 
 
 
-@njit(cache=True)
+@inner
 def least_squares(A, r, damping, x):
     """Write the least-squares solution x (m,) of A x = r, damped where A is nearly singular.
 
@@ -298,7 +311,7 @@ def least_squares(A, r, damping, x):
 
 
 
-@njit(cache=True)
+@inner
 def eliminate(A, x, share, scale):
     """x ← A⁻¹ x in place by elimination without pivoting; A (n, n) is overwritten.
 

@@ -11,8 +11,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sealag.kernels._jit import entry, inner
 from sealag.kernels.ledger import (
     COMMAND,
     COULOMB,
@@ -106,20 +106,20 @@ class Series(NamedTuple):
     values: Array  # (3, places) of the three
 
 
-@njit(cache=True)
+@inner
 def allocate_series():
     """Return memory for one rotor's series."""
     return Series(np.empty(_TERMS), np.empty(_TERMS), np.empty(_TERMS), np.empty((3, 8)))
 
 
-@njit(cache=True)
+@inner
 def spring_torque(motors, j, rotor, angle, speed):
     """Return τ_sea = K (θ − q) + D_s (θ̇ − q̇) of joint j, Nm; linear."""
     stretch, rate = rotor.angle - angle, rotor.speed - speed
     return motors.stiffness[j] * stretch + motors.spring_damping[j] * rate
 
 
-@njit(cache=True)
+@inner
 def rates(motors, j, instant, drive, rotor, angle, speed):
     """Return the rates of joint j's rotor, its spring torque and the torque on the rotor.
 
@@ -151,7 +151,7 @@ def rates(motors, j, instant, drive, rotor, angle, speed):
     return Rotor(rotor.speed, net / motors.inertia[j], torque_rate), spring, torque
 
 
-@njit(cache=True)
+@entry
 def rate_rows(raw_motors, instant, speed, torque):
     """Write what each of six causes does to the rates of speed and drive torque within limits.
 
@@ -172,7 +172,7 @@ def rate_rows(raw_motors, instant, speed, torque):
             speed[cause, j], torque[cause, j] = moved.speed, moved.torque
 
 
-@njit(cache=True)
+@inner
 def _fastest(motors, j, instant, limited):
     """Return a bound of the rate at which joint j's equation moves the rotor's state, 1/s.
 
@@ -191,7 +191,7 @@ def _fastest(motors, j, instant, limited):
     return 2.0 * swing + damping / B + motors.bandwidth[j] * lag
 
 
-@njit(cache=True)
+@inner
 def _order(reach):
     """Return how many terms of a series over rate times time ``reach`` are more than rounding."""
     term, order = 1.0, 0
@@ -201,7 +201,7 @@ def _order(reach):
     return order + _FORCED
 
 
-@njit(cache=True)
+@inner
 def link_at(link, t):
     """Return a link's motion from t on."""
     return Link(
@@ -212,7 +212,7 @@ def link_at(link, t):
     )
 
 
-@njit(cache=True)
+@inner
 def link_through(q_0, v_0, q_1, v_1, step):
     """Return the cubic through angles and speeds at both ends of a step."""
     rise, turn = q_1 - q_0 - step * v_0, v_1 - v_0
@@ -222,14 +222,14 @@ def link_through(q_0, v_0, q_1, v_1, step):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@inner
 def link_work(link, step):
     """Return ∫q̇² over a step."""
     a, b, c = link.speed, link.bend * step, 0.5 * link.jerk * step**2
     return step * (a * a + a * b + (b * b + 2.0 * a * c) / 3.0 + 0.5 * b * c + 0.2 * c * c)
 
 
-@njit(cache=True)
+@inner
 def _expand(motors, j, instant, drive, rotor, link, t, order, series):
     """Write the series of speed, spring and motor torque over a time t; return the rotor then."""
     angle = speed = torque = 0.0
@@ -246,7 +246,7 @@ def _expand(motors, j, instant, drive, rotor, link, t, order, series):
     return Rotor(angle, speed, torque)
 
 
-@njit(cache=True)
+@inner
 def _integrate(series, order, link, t, works):
     """Add the works of one piece of a motion by Gauss' rule."""
     values = series.values
@@ -269,7 +269,7 @@ def _integrate(series, order, link, t, works):
     return Works(squared, port, shaft, slip, motor)
 
 
-@njit(cache=True)
+@inner
 def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     """Move rotor j along its link's cubic while its drive does one thing.
 
@@ -298,7 +298,7 @@ def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     return rotor, works
 
 
-@njit(cache=True)
+@inner
 def choose(motors, j, held, rotor, link):
     """Return what drive j does from now on, the direction of Coulomb friction (0 for none), and the
     rotor with the torque that it then has."""
@@ -326,7 +326,7 @@ def choose(motors, j, held, rotor, link):
     return drive, direction, Rotor(rotor.angle, rotor.speed, torque)
 
 
-@njit(cache=True)
+@inner
 def _reversal(motors, j, instant, drive, rotor, link, time, series):
     """Return the instant in (0, time) at which the speed passes through zero (Illinois)."""
     direction = math.copysign(1.0, rotor.speed)
@@ -348,7 +348,7 @@ def _reversal(motors, j, instant, drive, rotor, link, time, series):
     return 0.5 * (low + high)
 
 
-@njit(cache=True)
+@inner
 def predict(motors, j, held, rotor, link, step, series):
     """Return rotor j half a step and a step ahead along its link's motion."""
     drive, _, rotor = choose(motors, j, held, rotor, link)
@@ -358,7 +358,7 @@ def predict(motors, j, held, rotor, link, step, series):
     return half, whole
 
 
-@njit(cache=True)
+@inner
 def move(motors, j, held, rotor, link, step, series, flows):
     """Move rotor j over a step along its link's cubic, and write its works.
 
@@ -406,7 +406,7 @@ def move(motors, j, held, rotor, link, step, series, flows):
     return rotor
 
 
-@njit(cache=True)
+@inner
 def _book(motors, j, works, way, command, flows):
     """Add the works of a piece of rotor j's motion, each with its own coefficient."""
     flows[PORT, j] += works.port

@@ -8,7 +8,8 @@ neighbouring ones an upper bound for all angles between them (the vertex of two 
 import math
 
 import numpy as np
-from numba import njit
+
+from sealag.kernels._jit import entry, inner
 
 LONGEST = 4096
 """Angles at most: a disc, the slowest numerical range, needs 1,600 for 1e-6."""
@@ -16,7 +17,7 @@ LONGEST = 4096
 EPS = 2.220446049250313e-16
 
 
-@njit(cache=True)
+@inner
 def _tridiagonal(H, diagonal, off_squared, v, p):
     """Householder reduction of a Hermitian H (n, n), overwritten; squared off-diagonals."""
     n = H.shape[0]
@@ -55,7 +56,7 @@ def _tridiagonal(H, diagonal, off_squared, v, p):
         off_squared[n - 2] = H[n - 1, n - 2].real ** 2 + H[n - 1, n - 2].imag ** 2
 
 
-@njit(cache=True)
+@inner
 def _largest_root(diagonal, off_squared, start, tiny):
     """Largest eigenvalue of a tridiagonal matrix, by Laguerre's iteration from above."""
     n = diagonal.shape[0]
@@ -86,7 +87,7 @@ def _largest_root(diagonal, off_squared, start, tiny):
     return x
 
 
-@njit(cache=True)
+@inner
 def support(S, T, phi, H, v, p, diagonal, off_squared, scale):
     """λ_max(cos φ · S + i sin φ · T) to a few units of rounding of ``scale`` = ‖A‖_F."""
     n = S.shape[0]
@@ -107,7 +108,7 @@ def support(S, T, phi, H, v, p, diagonal, off_squared, scale):
     return _largest_root(diagonal, off_squared, start, 4.0 * EPS * scale)
 
 
-@njit(cache=True)
+@inner
 def _sector_bound(phi_1, h_1, phi_2, h_2):
     """Largest value on [φ_1, φ_2] of the sinusoid through both, and where it is."""
     width = phi_2 - phi_1
@@ -118,7 +119,7 @@ def _sector_bound(phi_1, h_1, phi_2, h_2):
     return max(h_1, h_2), 0.5 * (phi_1 + phi_2)
 
 
-@njit(cache=True)
+@inner
 def _refine(S, T, tolerance, scale, work, fan):
     """Bracket max λ_max over [0, π] (the other half is its mirror image for real A)."""
     H, v, p, diagonal, off_squared = work
@@ -153,7 +154,7 @@ def _refine(S, T, tolerance, scale, work, fan):
             best, best_phi = h[at + 1], where
 
 
-@njit(cache=True)
+@entry
 def numerical_radii(A, slack, tolerance, lower, upper, angle):
     """Bracket the numerical radius of each matrix.
 
@@ -200,9 +201,3 @@ def numerical_radii(A, slack, tolerance, lower, upper, angle):
         rounding = (20.0 * n + 40.0) * EPS * scale
         lower[k] = max((best - rounding) * largest - slack[k], 0.0)
         upper[k] = (bound + rounding) * (1.0 + 8.0 * EPS) * largest + slack[k]
-
-
-def warm() -> None:
-    """Compile every kernel of this module."""
-    A = np.array([[[1.0, 2.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 3.0]]])
-    numerical_radii(A, np.zeros(1), 1e-6, np.zeros(1), np.zeros(1), np.zeros(1))

@@ -3,9 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sealag.kernels._jit import entry, inner
 from sealag.kernels.linalg import (
+    copy,
     invert_spd,
     multiply,
     multiply_transposed,
@@ -66,14 +67,14 @@ class StackedSpaces(NamedTuple):
     lift: Array  # (N, m, nv) rows of Λ_k J_k P_k
 
 
-@njit(cache=True)
+@entry
 def memory_size(nv, n, c, m):
     """Return how many numbers `divide` divides."""
     wide = nv * (n + m + 2 * nv) + n * (m + 1) + 2 * m * m
     return wide + 8 * n * n + 7 * c * c + 5 * m * m + (2 * c + m + n) * nv + max(n, c, m, 1)
 
 
-@njit(cache=True)
+@entry
 def divide(memory, nv, n, c, m):
     """Return the arrays of one operational space, views of one memory.
 
@@ -116,7 +117,7 @@ def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
     return divide(np.zeros(memory_size(nv, n, c, m)), nv, n, c, m)
 
 
-@njit(cache=True)
+@inner
 def _subtract_projection(P, X, inverse, scratch):
     """P ← P − Xᵀ A⁺ X with X (k, nv), A⁺ (k, k) and scratch (k, nv)."""
     multiply(inverse, X, scratch)
@@ -129,13 +130,13 @@ def _subtract_projection(P, X, inverse, scratch):
                     P[i, j] -= x * scratch[r, j]
 
 
-@njit(cache=True)
+@inner
 def _constrain(M, J_s, tolerance, space):
     """P = N_s M⁻¹, the inverse inertia that the contacts leave; False if M is not positive."""
     if not invert_spd(M, space.M_inverse, space.P):
         return False
     P = space.P
-    P[:, :] = space.M_inverse
+    copy(space.M_inverse, P)
     if J_s.shape[0] == 0:
         return True
     X, scratch = space.moved_c, space.wide_c
@@ -148,7 +149,7 @@ def _constrain(M, J_s, tolerance, space):
     return True
 
 
-@njit(cache=True)
+@inner
 def _stiffness_block(form, K, Lambda, root, scratch, out):
     """The task stiffness of one level: Λ^½ K Λ^½, Λ K, or K."""
     if form == SYMMETRIC:
@@ -157,10 +158,10 @@ def _stiffness_block(form, K, Lambda, root, scratch, out):
     elif form == PUBLISHED:
         multiply(Lambda, K, out)
     else:
-        out[:, :] = K
+        copy(K, out)
 
 
-@njit(cache=True)
+@inner
 def operational_space(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space):
     """Fill ``space`` at one instant, Eqs. (10), (11) with Sentis' recursive null spaces.
 
@@ -213,7 +214,7 @@ def operational_space(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space)
     return True
 
 
-@njit(cache=True)
+@inner
 def _mobility(J, M_inverse):
     """trace(J M⁻¹ Jᵀ): the scale against which a lost direction is small."""
     total = 0.0
@@ -225,7 +226,7 @@ def _mobility(J, M_inverse):
     return total
 
 
-@njit(cache=True)
+@inner
 def _level(J_t, K_x, first, last, form, star, tolerance, space):
     """One priority level: J*, its stiffness, and what is left for the next level."""
     size = last - first
@@ -267,7 +268,7 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
             space.Lambda[first + i, first + j] = Lambda[i, j]
 
 
-@njit(cache=True)
+@entry
 def operational_spaces(raw_terms, K_x, levels, form, star, tolerance, raw_out):
     """`operational_space` at N instants, one after the other.
 
@@ -288,16 +289,16 @@ def operational_spaces(raw_terms, K_x, levels, form, star, tolerance, raw_out):
             space,
         ):  # fmt: skip
             return k
-        out.J_star[k] = space.J_star
-        out.Lambda[k] = space.Lambda
-        out.stiffness[k] = space.stiffness
-        out.along[k] = space.joint_from_base
-        out.gravity[k] = space.gravity
-        out.lift[k] = space.lift
+        copy(space.J_star, out.J_star[k])
+        copy(space.Lambda, out.Lambda[k])
+        copy(space.stiffness, out.stiffness[k])
+        copy(space.joint_from_base, out.along[k])
+        copy(space.gravity, out.gravity[k])
+        copy(space.lift, out.lift[k])
     return -1
 
 
-@njit(cache=True)
+@inner
 def task_torque(J_star, stiffness, error, gravity, out):
     """out = J*ᵀ S error + gravity, Eqs. (11), (17)."""
     m, n = J_star.shape

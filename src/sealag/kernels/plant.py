@@ -8,8 +8,8 @@ and the log, until something needs Python: a tick, another load, a change of con
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sealag.kernels._jit import entry, inner
 from sealag.kernels import motor, spatial
 from sealag.kernels.contact import (
     Instant,
@@ -30,6 +30,7 @@ from sealag.kernels.ledger import (
     SPRING_STORE,
     Ledger,
 )
+from sealag.kernels.linalg import copy
 from sealag.kernels.motor import Held, Rotor, Series
 from sealag.typing import Array, IntArray
 
@@ -111,6 +112,9 @@ class Log(NamedTuple):
     undelayed_work: Array  # (N, n)
 
 
+WHOLE = ("tick", "contact_mode")  # columns of the log that are whole numbers
+
+
 class Limits(NamedTuple):
     """When a run has left what it is about."""
 
@@ -121,7 +125,7 @@ class Limits(NamedTuple):
     up: Array  # (1, 3) where its z axis points at the start
 
 
-@njit(cache=True)
+@inner
 def _allocate_step(nv, gained):
     n = gained.joint.shape[1]
     return Step(
@@ -130,7 +134,7 @@ def _allocate_step(nv, gained):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@inner
 def _predict_motors(plant, now, held, step, memory):
     """Write motor angles and speeds half a step and a step ahead, the links accelerating evenly."""
     n, motors = now.theta.size, plant.motors
@@ -143,7 +147,7 @@ def _predict_motors(plant, now, held, step, memory):
         memory.angle[1, j], memory.speed[1, j] = whole.angle, whole.speed
 
 
-@njit(cache=True)
+@inner
 def _close(plant, now, held, step, memory, following):
     """Move the links to the step's end, and the motors along the links' cubic."""
     n = now.theta.size
@@ -162,23 +166,28 @@ def _close(plant, now, held, step, memory, following):
         following.tau_motor[j] = rotor.torque
 
 
-@njit(cache=True)
+@inner
 def _step(plant, work, now, held, step, memory, following):
     """Do a step in the present contact modes; return whether every instant has a solution."""
     rates, accelerations, powers = memory.rates, memory.accelerations, memory.powers
     base = now.v.size - now.theta.size
     _predict_motors(plant, now, held, step, memory)
-    following.tau_motor[:], following.force[:] = now.tau_motor, now.force
-    rates[0], accelerations[0], powers[0] = now.v, now.acceleration, now.power
+    copy(now.tau_motor, following.tau_motor)
+    copy(now.force, following.force)
+    copy(now.v, rates[0])
+    copy(now.acceleration, accelerations[0])
+    copy(now.power, powers[0])
     for k in range(1, 4):
         spatial.stage(
             now.q, now.v, rates[k - 1], accelerations[k - 1], step if k == 3 else 0.5 * step, base,
             memory.displacement, following.q, following.v, rates[k],
         )  # fmt: skip
-        following.theta[:], following.theta_dot[:] = memory.angle[k // 3], memory.speed[k // 3]
+        copy(memory.angle[k // 3], following.theta)
+        copy(memory.speed[k // 3], following.theta_dot)
         if not accelerate(plant, following, work):
             return False
-        accelerations[k], powers[k] = following.acceleration, following.power
+        copy(following.acceleration, accelerations[k])
+        copy(following.power, powers[k])
     for k in range(powers.shape[1]):
         mean = powers[0, k] + 2.0 * (powers[1, k] + powers[2, k]) + powers[3, k]
         memory.gained.scalar[k] = step / 6.0 * mean
@@ -186,7 +195,7 @@ def _step(plant, work, now, held, step, memory, following):
     return accelerate(plant, following, work)
 
 
-@njit(cache=True)
+@inner
 def _stores(motors, at, out):
     """Write kinetic, gravity, spring and motor energy (4,)."""
     n = at.theta.size
@@ -198,7 +207,7 @@ def _stores(motors, at, out):
         out[MOTOR_STORE] += 0.5 * motors.inertia[j] * at.theta_dot[j] * at.theta_dot[j]
 
 
-@njit(cache=True)
+@inner
 def _update_stores(motors, at, ledger):
     """Write the stores of an instant, and add how much has moved between them."""
     before = ledger.stores.copy()
@@ -207,28 +216,37 @@ def _update_stores(motors, at, ledger):
         ledger.moved[0] += abs(ledger.stores[k] - before[k])
 
 
-@njit(cache=True)
+@inner
 def _accept(motors, following, now, gained, ledger):
     """Take the step's end for the present instant, and book the step."""
-    ledger.joint[:] += gained.joint
+    for k in range(gained.joint.shape[0]):
+        for j in range(gained.joint.shape[1]):
+            ledger.joint[k, j] += gained.joint[k, j]
     for k in range(IMPACT):
         ledger.scalar[k] += gained.scalar[k]
     _copy(following, now)
     _update_stores(motors, now, ledger)
 
 
-@njit(cache=True)
+@inner
 def _copy(source, target):
-    target.q[:], target.v[:] = source.q, source.v
-    target.theta[:], target.theta_dot[:] = source.theta, source.theta_dot
-    target.tau_motor[:], target.tau_sea[:] = source.tau_motor, source.tau_sea
-    target.acceleration[:], target.force[:] = source.acceleration, source.force
-    target.gap[:], target.position[:] = source.gap, source.position
-    target.velocity[:], target.power[:] = source.velocity, source.power
-    target.energy[:] = source.energy
+    """Write everything about one instant into another."""
+    copy(source.q, target.q)
+    copy(source.v, target.v)
+    copy(source.theta, target.theta)
+    copy(source.theta_dot, target.theta_dot)
+    copy(source.tau_motor, target.tau_motor)
+    copy(source.tau_sea, target.tau_sea)
+    copy(source.acceleration, target.acceleration)
+    copy(source.force, target.force)
+    copy(source.gap, target.gap)
+    copy(source.position, target.position)
+    copy(source.velocity, target.velocity)
+    copy(source.power, target.power)
+    copy(source.energy, target.energy)
 
 
-@njit(cache=True)
+@entry
 def advance(raw_plant, raw_terms, raw_instants, raw_held, step, raw_gained):
     """Try a step in the present contact modes.
 
@@ -248,7 +266,7 @@ def advance(raw_plant, raw_terms, raw_instants, raw_held, step, raw_gained):
     return _step(plant, work, now, Held(*raw_held), step, memory, following)
 
 
-@njit(cache=True)
+@entry
 def accept(raw_plant, raw_instants, raw_gained, raw_ledger):
     """Take the end of the step that was tried for the present instant, and book the step."""
     now, following = raw_instants
@@ -258,7 +276,7 @@ def accept(raw_plant, raw_instants, raw_gained, raw_ledger):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@entry
 def begin_books(raw_plant, raw_now, raw_ledger):
     """Open empty books at an instant."""
     ledger = Ledger(*raw_ledger)
@@ -266,7 +284,7 @@ def begin_books(raw_plant, raw_now, raw_ledger):
     _stores(plant_of(raw_plant).motors, Instant(*raw_now), ledger.stores)
 
 
-@njit(cache=True)
+@entry
 def book_impact(raw_plant, raw_now, lost, raw_ledger):
     """Book what an impact took, J, and the stores after it."""
     ledger = Ledger(*raw_ledger)
@@ -274,7 +292,7 @@ def book_impact(raw_plant, raw_now, lost, raw_ledger):
     _update_stores(plant_of(raw_plant).motors, Instant(*raw_now), ledger)
 
 
-@njit(cache=True)
+@inner
 def _lost(plant, now, limits):
     """Whether the robot has fallen or left any physical range."""
     n, contacts = now.theta.size, plant.contacts
@@ -291,11 +309,11 @@ def _lost(plant, now, limits):
     return height < limits.height or spatial.dot(z_axis, spatial.vector(limits.up, 0)) < limits.tilt
 
 
-@njit(cache=True)
+@inner
 def _feed_torque(channels, periods, look, now):
     """Give the drives the spring torque that reaches their torque feedback now."""
     history, size = channels.torque_history, channels.torque_history.shape[0]
-    history[look % size] = now.tau_sea
+    copy(now.tau_sea, history[look % size])
     place = channels.torque_known[look] / periods.torque_period
     before = int(place + SAME)
     part, after = max(0.0, place - before), min(before + 1, look)
@@ -304,25 +322,32 @@ def _feed_torque(channels, periods, look, now):
         channels.torque_held[j] = earlier + part * (history[after % size, j] - earlier)
 
 
-@njit(cache=True)
+@inner
 def _record(plant, channels, now, time, ledger, log, row):
     """Write a row of the log."""
     contacts = plant.contacts
     log.time[row], log.tick[row] = time, channels.acting_tick[0]
-    log.q[row], log.v[row], log.theta[row] = now.q, now.v, now.theta
-    log.theta_dot[row], log.tau_motor[row] = now.theta_dot, now.tau_motor
-    log.tau_sea[row], log.tau_osc[row] = now.tau_sea, channels.acting
-    log.tau_command[row], log.contact_force[row] = channels.sent, now.force
+    copy(now.q, log.q[row])
+    copy(now.v, log.v[row])
+    copy(now.theta, log.theta[row])
+    copy(now.theta_dot, log.theta_dot[row])
+    copy(now.tau_motor, log.tau_motor[row])
+    copy(now.tau_sea, log.tau_sea[row])
+    copy(channels.sent, log.tau_command[row])
+    copy(channels.acting, log.tau_osc[row])
+    copy(channels.undelayed_work, log.undelayed_work[row])
+    copy(now.force, log.contact_force[row])
+    copy(ledger.stores, log.stores[row])
+    copy(ledger.joint, log.joint[row])
+    copy(ledger.scalar, log.scalar[row])
     log.storage[row], log.tank[row] = channels.storage[0], channels.tank[0]
-    log.undelayed_work[row] = channels.undelayed_work
     for i in range(contacts.closed.size):
         slipping = 1 if contacts.yielding[i] > 0.0 else 0
         log.contact_mode[row, i] = contacts.closed[i] * (1 + slipping)
-    log.stores[row], log.joint[row], log.scalar[row] = ledger.stores, ledger.joint, ledger.scalar
     log.moved[row] = ledger.moved[0]
 
 
-@njit(cache=True)
+@inner
 def _happen(plant, channels, now, event):
     """Let an event happen; False if it needs Python."""
     tick = channels.tick[event]
@@ -330,14 +355,14 @@ def _happen(plant, channels, now, event):
         row = channels.samples[tick % channels.samples.shape[0]]
         write_measurement(now, plant.contacts, channels.due[event], row)
     elif channels.kind[event] == TAKE:
-        channels.acting[:] = channels.commands[tick % channels.commands.shape[0]]
+        copy(channels.commands[tick % channels.commands.shape[0]], channels.acting)
         channels.acting_tick[0] = tick
     else:
         return False
     return True
 
 
-@njit(cache=True)
+@inner
 def _slide(plant, work, now, held, step, memory, following):
     """Try a step in which no contact changes; False, with all as it was, if one does."""
     contacts = plant.contacts
@@ -349,7 +374,7 @@ def _slide(plant, work, now, held, step, memory, following):
         smallest, _ = smallest_margin(contacts, following)
         if smallest >= -MARGIN:
             return True
-    contacts.yielding[:] = before
+    copy(before, contacts.yielding)
     return False
 
 
@@ -362,7 +387,7 @@ class Cursor(NamedTuple):
     part: int  # WATCH, EVENTS, CLOSE, MOVE or INSIDE
 
 
-@njit(cache=True)
+@entry
 def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, cursor, said):
     """Go on with a run until something needs Python.
 
@@ -428,7 +453,7 @@ def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, curs
         _accept(plant.motors, following, now, gained, ledger)
 
 
-@njit(cache=True)
+@inner
 def _unpack(raw_plant, raw_terms, raw_instants, raw_ledger):
     """Return plant, memory, the present and the following instant, and the books."""
     plant, (now, following) = plant_of(raw_plant), raw_instants

@@ -9,116 +9,123 @@ base, 0 for a fixed one.
 import math
 
 import numpy as np
-from numba import njit
+
+from sealag.kernels._jit import inner
 
 
-@njit(cache=True)
+@inner
 def vector(rows, i):
     """Return row i (3,) of an array."""
     return rows[i, 0], rows[i, 1], rows[i, 2]
 
 
-@njit(cache=True)
+@inner
 def linear(twists, i):
     """Return the linear part of the spatial vector in row i (6,) of an array."""
     return twists[i, 0], twists[i, 1], twists[i, 2]
 
 
-@njit(cache=True)
+@inner
 def angular(twists, i):
     """Return the angular part of the spatial vector in row i (6,) of an array."""
     return twists[i, 3], twists[i, 4], twists[i, 5]
 
 
-@njit(cache=True)
+@inner
 def rotation(matrices, i):
     """Return matrix i (3, 3) of a stack."""
-    R = matrices[i]
     return (
-        (R[0, 0], R[0, 1], R[0, 2]), (R[1, 0], R[1, 1], R[1, 2]), (R[2, 0], R[2, 1], R[2, 2]),
-    )  # fmt: skip
+        (matrices[i, 0, 0], matrices[i, 0, 1], matrices[i, 0, 2]),
+        (matrices[i, 1, 0], matrices[i, 1, 1], matrices[i, 1, 2]),
+        (matrices[i, 2, 0], matrices[i, 2, 1], matrices[i, 2, 2]),
+    )
 
 
-@njit(cache=True)
+@inner
 def put_vector(rows, i, a):
     """Write a into row i (3,) of an array."""
     rows[i, 0], rows[i, 1], rows[i, 2] = a
 
 
-@njit(cache=True)
+@inner
 def put_twist(twists, i, a, b):
     """Write linear part a and angular part b into row i (6,) of an array."""
     twists[i, 0], twists[i, 1], twists[i, 2] = a
     twists[i, 3], twists[i, 4], twists[i, 5] = b
 
 
-@njit(cache=True)
+@inner
 def put_rotation(matrices, i, R):
     """Write R into matrix i (3, 3) of a stack."""
-    a, b, c = R
-    put_vector(matrices[i], 0, a)
-    put_vector(matrices[i], 1, b)
-    put_vector(matrices[i], 2, c)
+    (a, b, c), (d, e, f), (g, h, j) = R
+    matrices[i, 0, 0], matrices[i, 0, 1], matrices[i, 0, 2] = a, b, c
+    matrices[i, 1, 0], matrices[i, 1, 1], matrices[i, 1, 2] = d, e, f
+    matrices[i, 2, 0], matrices[i, 2, 1], matrices[i, 2, 2] = g, h, j
 
 
-@njit(cache=True)
+@inner
 def add(a, b):
     """Return a + b."""
     (ax, ay, az), (bx, by, bz) = a, b
     return ax + bx, ay + by, az + bz
 
 
-@njit(cache=True)
+@inner
 def subtract(a, b):
     """Return a − b."""
     (ax, ay, az), (bx, by, bz) = a, b
     return ax - bx, ay - by, az - bz
 
 
-@njit(cache=True)
+@inner
 def scale(s, a):
     """Return s a."""
     x, y, z = a
     return s * x, s * y, s * z
 
 
-@njit(cache=True)
+@inner
 def dot(a, b):
     """Return aᵀ b."""
     (ax, ay, az), (bx, by, bz) = a, b
     return ax * bx + ay * by + az * bz
 
 
-@njit(cache=True)
+@inner
 def cross(a, b):
     """Return a × b."""
     (ax, ay, az), (bx, by, bz) = a, b
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@njit(cache=True)
-def rotate(R, a):
-    """Return R a."""
-    x, y, z = R
-    return dot(x, a), dot(y, a), dot(z, a)
+@inner
+def rotate(R, v):
+    """Return R v."""
+    (a, b, c), (d, e, f), (g, h, i) = R
+    x, y, z = v
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
-@njit(cache=True)
+@inner
 def transpose(R):
     """Return Rᵀ."""
     (a, b, c), (d, e, f), (g, h, i) = R
     return (a, d, g), (b, e, h), (c, f, i)
 
 
-@njit(cache=True)
+@inner
 def compose(A, B):
     """Return A B."""
-    Bt = transpose(B)
-    x, y, z = A
-    return rotate(Bt, x), rotate(Bt, y), rotate(Bt, z)
+    (a, b, c), (d, e, f), (g, h, i) = A
+    (j, k, l), (m, n, o), (p, q, r) = B
+    return (
+        (a * j + b * m + c * p, a * k + b * n + c * q, a * l + b * o + c * r),
+        (d * j + e * m + f * p, d * k + e * n + f * q, d * l + e * o + f * r),
+        (g * j + h * m + i * p, g * k + h * n + i * q, g * l + h * o + i * r),
+    )
 
 
-@njit(cache=True)
+@inner
 def rotation_of(x, y, z, w):
     """Return the rotation of a unit quaternion."""
     return (
@@ -128,11 +135,12 @@ def rotation_of(x, y, z, w):
     )
 
 
-@njit(cache=True)
+@inner
 def integrate(q, u, base, out):
     """Write q + u, the base moved by the exponential of its twist, into ``out``."""
     if base == 0:
-        out[:] = q + u
+        for i in range(q.size):
+            out[i] = q[i] + u[i]
         return
     x, y, z, w = q[3], q[4], q[5], q[6]
     wx, wy, wz = u[3], u[4], u[5]
@@ -167,10 +175,11 @@ def integrate(q, u, base, out):
         out[i] = q[i] + u[i - 1]
 
 
-@njit(cache=True)
+@inner
 def tangent_rate(u, v, base, out):
     """Write the rate of the coordinates u of q0 + u whose velocity is v (to fourth order)."""
-    out[:] = v
+    for i in range(v.size):
+        out[i] = v[i]
     if base == 0:
         return
     move, spin = (u[0], u[1], u[2]), (u[3], u[4], u[5])
@@ -186,13 +195,13 @@ def tangent_rate(u, v, base, out):
     out[5] += rz
 
 
-@njit(cache=True)
+@inner
 def _bracket(move, spin, v, omega):
     """Return the Lie bracket of two twists, linear and angular part."""
     return add(cross(spin, v), cross(move, omega)), cross(spin, omega)
 
 
-@njit(cache=True)
+@inner
 def stage(q0, v0, rate, acceleration, step, base, u, q, v, next_rate):
     """Move to one Runge-Kutta stage: u = step rate, v = v0 + step acceleration, q = q0 + u."""
     for i in range(v0.size):
@@ -202,7 +211,7 @@ def stage(q0, v0, rate, acceleration, step, base, u, q, v, next_rate):
     tangent_rate(u, v, base, next_rate)
 
 
-@njit(cache=True)
+@inner
 def combine(q0, v0, rates, accelerations, step, base, q, v):
     """Close the fourth-order Runge-Kutta step from its four stages' rates and accelerations."""
     u = np.empty(v0.size)

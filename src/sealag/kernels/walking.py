@@ -1,12 +1,13 @@
 """Walking kernels: quintic references, the pendulum under a planned height, foothold and swing."""
 
 import numpy as np
-from numba import njit
+
+from sealag.kernels._jit import entry, inner
 
 GRAVITY = 9.81
 
 
-@njit(cache=True)
+@entry
 def quintic(start, end, duration, c):
     """Write the coefficients c (6,) of the quintic between two (position, rate, acceleration).
 
@@ -26,7 +27,7 @@ def quintic(start, end, duration, c):
     c[5] = (6.0 * d0 - 3.0 * d1 * T + 0.5 * d2 * T * T) / T**5
 
 
-@njit(cache=True)
+@entry
 def quintic_at(c, t, out):
     """Write position, rate and acceleration (3,) of a quintic at a time.
 
@@ -40,7 +41,7 @@ def quintic_at(c, t, out):
     out[2] = 2 * c[2] + t * (6 * c[3] + t * (12 * c[4] + t * 20 * c[5]))
 
 
-@njit(cache=True)
+@inner
 def pendulum(x, v, begin, end, transfer, old, new, height, offset, steps):
     """Move the pendulum's x, v (2,) in place from one phase of a step to another.
 
@@ -76,7 +77,7 @@ def pendulum(x, v, begin, end, transfer, old, new, height, offset, steps):
             v[k] += h * a
 
 
-@njit(cache=True)
+@entry
 def capture_end(com, speed, momentum, old, new, height, offset, phase, gait, share, memory):
     """Average where the present step ends and write the foothold it asks for.
 
@@ -113,7 +114,7 @@ def capture_end(com, speed, momentum, old, new, height, offset, phase, gait, sha
     return new[0] + forward, new[1] + side * outward
 
 
-@njit(cache=True)
+@entry
 def swing(now, target, phase, period, gait, lift, bump):
     """Move the swing foot's reference by one period; late, lower it until it meets the ground.
 
@@ -147,15 +148,3 @@ def swing(now, target, phase, period, gait, lift, bump):
     rate = 30 * rise * (u * w) ** 2 + 192 * bump * (u * w) ** 2 * (w - u)
     bend = 60 * rise * u * w * (w - u) + 384 * bump * u * w * ((w - u) ** 2 - u * w)
     now[1, 2], now[2, 2] = rate / duration, bend / duration**2
-
-
-def warm() -> None:
-    """Compile every kernel of this module."""
-    c, out, foot = np.zeros(6), np.zeros(3), np.zeros(3)
-    quintic(np.zeros(3), np.ones(3), 1.0, c)
-    quintic_at(c, 0.5, out)
-    c[0] = 1.0
-    pendulum(np.zeros(2), np.zeros(2), 0.0, 0.1, 0.05, foot, foot, c, 0.0, 2)
-    two, gait = np.zeros(2), np.arange(1.0, 13.0)
-    capture_end(foot, foot, two, foot, foot, c, 0.0, 0.1, gait, 1.0, np.zeros((2, 2)))
-    swing(np.zeros((3, 3)), foot, 0.1, 1e-3, np.array([0.35, 0.06, 0.9, 0.3]), 0.0, 0.1)

@@ -6,15 +6,20 @@ The robot's terms are those of one instant; feet are point contacts (3 rows each
 import math
 
 import numpy as np
-from numba import njit
 
-from sealag.kernels import dynamics
-from sealag.kernels.dense import invert_spd, multiply, multiply_transposed
-from sealag.kernels.rigid import backward_solve, cholesky, forward_solve
+from sealag.kernels._jit import entry, inner
+from sealag.kernels.dynamics import Frames, Mounts, Terms, frame_terms
+from sealag.kernels.linalg import (
+    cholesky,
+    invert_spd,
+    least_squares,
+    multiply,
+    multiply_transposed,
+)
 from sealag.kernels.walking import quintic_at
 
 
-@njit(cache=True)
+@inner
 def constrain(M_inverse, h, J, b, a_0, P):
     """Write a_0 (nv,), P (nv, n) of v̇ = a_0 + P τ under the contact rows J v̇ = −b.
 
@@ -59,7 +64,7 @@ def constrain(M_inverse, h, J, b, a_0, P):
             P[i, j] = s
 
 
-@njit(cache=True)
+@inner
 def task_torques(a_0, P, J_t, b_t, wanted, damping, tau):
     """Write τ (n,) that gives the tasks the accelerations wanted.
 
@@ -69,7 +74,7 @@ def task_torques(a_0, P, J_t, b_t, wanted, damping, tau):
         J_t: (n, nv) as many task rows as joints.
         b_t: (n,) J̇_t v.
         wanted: (n,) task accelerations.
-        damping: see `damped_solve`.
+        damping: see `least_squares`.
         tau: (n,) Nm, written.
     """
     n = P.shape[1]
@@ -80,10 +85,10 @@ def task_torques(a_0, P, J_t, b_t, wanted, damping, tau):
         for c in range(a_0.size):
             s -= J_t[i, c] * a_0[c]
         r[i] = s
-    damped_solve(A, r, damping, tau)
+    least_squares(A, r, damping, tau)
 
 
-@njit(cache=True)
+@inner
 def _posture(R, v, heading):
     """Write the heading (2, 3) of a base rotation; return roll, pitch and the turn rates (3,)."""
     yaw = math.atan2(R[1, 0], R[0, 0])
@@ -98,16 +103,16 @@ def _posture(R, v, heading):
     return math.atan2(R[2, 1], R[2, 2]), pitch, turn
 
 
-@njit(cache=True)
-def law(terms, mounts, v, h, still, height, swing, phase, clock, stance, gains, tau, rates):
+@entry
+def law(raw_terms, raw_mounts, v, h, still, height, swing, phase, clock, stance, gains, tau, rates):
     """Write the task torques, and the joint rates of the planned motion.
 
     Six tasks: CoM height, roll, pitch, swing foot. During the weight transfer the torques of both
     single supports are blended.
 
     Args:
-        terms: as `sealag.robot.Workspace.terms`.
-        mounts: of both feet, as `sealag.robot.Robot.frame_mounts`.
+        raw_terms: of the robot.
+        raw_mounts: of both feet.
         v: (12,) velocity.
         h: (12,) Coriolis and gravity torques.
         still: whether J̇ v counts as zero.
@@ -125,17 +130,19 @@ def law(terms, mounts, v, h, still, height, swing, phase, clock, stance, gains, 
     Returns:
         Whether the torques are finite.
     """
-    nv, com = v.size, terms[7]
-    J, R, p, bias = np.empty((2, 6, nv)), np.empty((2, 3, 3)), np.empty((2, 3)), np.zeros((2, 6))
-    dynamics.frames(terms, mounts, J, R, p, bias)
-    bend = 0.0 if still else com[2, 2]
+    terms, nv = Terms(*raw_terms), v.size
+    frames = Frames(np.empty((2, 6, nv)), np.empty((2, 3, 3)), np.empty((2, 3)), np.zeros((2, 6)))
+    frame_terms(terms, Mounts(*raw_mounts), frames)
+    J, p, bias = frames.J, frames.p, frames.drift
+    bend = 0.0 if still else terms.com_drift[2]
     if still:
         bias[:] = 0.0
     heading, z, other = np.empty((2, 3)), np.empty(3), 1 - stance
-    roll, pitch, turn = _posture(terms[3][1], v, heading)
+    roll, pitch, turn = _posture(terms.rotation[1], v, heading)
     quintic_at(height, clock[1], z)
     wanted, velocity = np.zeros(6), np.zeros(12)
-    wanted[0] = gains[6] * z[2] + gains[0] * (z[0] - com[0, 2]) + gains[3] * (z[1] - com[1, 2])
+    wanted[0] = gains[6] * z[2] + gains[0] * (z[0] - terms.com[2])
+    wanted[0] += gains[3] * (z[1] - terms.com_velocity[2])
     for i in range(2):
         wanted[1 + i] = -gains[1] * (pitch if i else roll)
         wanted[1 + i] -= gains[4] * (heading[i, 0] * turn[0] + heading[i, 1] * turn[1])
@@ -148,10 +155,10 @@ def law(terms, mounts, v, h, still, height, swing, phase, clock, stance, gains, 
             wanted[3 + a] = gains[6] * swing[2, a] + gains[2] * error + gains[5] * speed
             velocity[6 + a] = swing[1, a] + gains[7] * error
     M_inverse, factor = np.empty((nv, nv)), np.empty((nv, nv))
-    if not invert_spd(terms[0], M_inverse, factor):
+    if not invert_spd(terms.M, M_inverse, factor):
         return False
     rows = np.zeros((12, nv))
-    _rows(J, terms[3][1], heading, terms[8], stance, rows)
+    _rows(J, terms.rotation[1], heading, terms.com_jacobian, stance, rows)
     _support(M_inverse, h, J, bias, rows[3:9], bend, stance, wanted, gains[8], tau)
     if transfer:
         back, share = np.empty(6), phase / clock[0]
@@ -160,14 +167,14 @@ def law(terms, mounts, v, h, still, height, swing, phase, clock, stance, gains, 
         _support(M_inverse, h, J, bias, turned, bend, other, wanted, gains[8], back)
         for j in range(6):
             tau[j] = share * tau[j] + (1.0 - share) * back[j]
-    velocity[3], velocity[9], velocity[10], velocity[11] = z[1], com[1, 0], com[1, 1], turn[2]
+    velocity[3], velocity[9:11], velocity[11] = z[1], terms.com_velocity[:2], turn[2]
     solution = np.empty(12)
-    damped_solve(rows, velocity, gains[8], solution)
+    least_squares(rows, velocity, gains[8], solution)
     rates[:] = solution[6:]
     return math.isfinite(tau.sum())
 
 
-@njit(cache=True)
+@inner
 def _rows(J, R, heading, com_jacobian, stance, rows):
     """Write the rows of stance foot, CoM height, posture, swing foot, CoM x and y, and yaw."""
     rows[0:3], rows[3] = J[stance, :3], com_jacobian[2]
@@ -178,7 +185,7 @@ def _rows(J, R, heading, com_jacobian, stance, rows):
             rows[4 + i, 3 + c] = heading[i, 0] * R[0, c] + heading[i, 1] * R[1, c]
 
 
-@njit(cache=True)
+@inner
 def _support(M_inverse, h, J, bias, rows, bend, stance, wanted, damping, tau):
     """Write the torque (6,) that gives the tasks ``wanted`` while standing on one foot."""
     a_0, P, b_t = np.empty(h.size), np.empty((h.size, 6)), np.zeros(6)
@@ -187,7 +194,7 @@ def _support(M_inverse, h, J, bias, rows, bend, stance, wanted, damping, tau):
     task_torques(a_0, P, rows, b_t, wanted, damping, tau)
 
 
-@njit(cache=True)
+@entry
 def carry(tau, limit, smooth, rates, tau_sea, D, D_by_K, gains, command):
     """Write the command that makes springs and motors carry the task torque within its limits.
 
@@ -210,22 +217,3 @@ def carry(tau, limit, smooth, rates, tau_sea, D, D_by_K, gains, command):
             smooth[j] = tau[j] + gains[0] * (smooth[j] - tau[j])
             command[j] = smooth[j] + D_by_K[j] * ((tau[j] - smooth[j]) / gains[1])
         command[j] += gains[2] * D[j] * rates[j] + gains[3] * (tau[j] - tau_sea[j])
-
-
-def example():
-    """Return tree, terms, mounts, q, v and six zeros with the types used in practice."""
-    foot = np.ones((2, 12), np.int64)
-    mounts = np.ones(2, np.int64), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), foot
-    q = np.zeros(13)
-    q[6] = 1.0
-    return *dynamics.example(12), mounts, q, np.zeros(12), np.zeros(6)
-
-
-def warm() -> None:
-    """Compile every kernel of this module."""
-    _, terms, mounts, _, v, six = example()
-    law(
-        terms, mounts, v, v, False, np.zeros(6), np.zeros((3, 3)), 0.1, (0.05, 0.1), 0,
-        np.zeros(9), six, six.copy(),
-    )  # fmt: skip
-    carry(six, six, six.copy(), six, six, six, six, np.zeros(4), six.copy())

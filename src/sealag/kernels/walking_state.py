@@ -4,15 +4,15 @@ The robot's terms are those of one instant; feet are point contacts (3 rows each
 """
 
 import numpy as np
-from numba import njit
 
-from sealag.kernels import dynamics
-from sealag.kernels.dense import invert_spd
-from sealag.kernels.rigid import integrate
-from sealag.kernels.walking_law import constrain, example
+from sealag.kernels._jit import entry, inner
+from sealag.kernels.dynamics import Frames, Mounts, Terms, Tree, frame_terms, rigid_body_terms
+from sealag.kernels.linalg import invert_spd
+from sealag.kernels.spatial import integrate
+from sealag.kernels.walking_law import constrain
 
 
-@njit(cache=True)
+@inner
 def predict(M, h, J, b, q_joint, v, motor, K, table, start, period, ticks, arrival, command,
             newest, begin, end):  # fmt: skip
     """Predict links, springs and motors under the commands still in flight.
@@ -87,7 +87,7 @@ def predict(M, h, J, b, q_joint, v, motor, K, table, start, period, ticks, arriv
     return moved
 
 
-@njit(cache=True)
+@inner
 def boost(v, M, J, h, b, change):
     """Add a constant velocity to the base, and to h and J̇ v what the rotating base makes of it.
 
@@ -115,13 +115,13 @@ def boost(v, M, J, h, b, change):
                 b[f, a] += J[f, a, i] * turn[i]
 
 
-@njit(cache=True)
+@inner
 def stand(terms, mounts, q, v, h, foot, anchor, J, b):
     """Write the feet's terms; if ``foot`` stands (not −1), take base place and velocity from it.
 
     Args:
-        terms: as `sealag.robot.Workspace.terms` at ``q``, ``v``.
-        mounts: of both feet, as `sealag.robot.Robot.frame_mounts`.
+        terms: of the robot at ``q``, ``v``.
+        mounts: of both feet.
         q: (13,) the base's position is moved so that the foot is at its anchor.
         v: (12,) the base's velocity is changed so that the foot is at rest.
         h: (12,) Coriolis and gravity torques, changed with v.
@@ -130,32 +130,32 @@ def stand(terms, mounts, q, v, h, foot, anchor, J, b):
         J: (2, 6, nv), written.
         b: (2, 3) J̇ v, written.
     """
-    R, p, bias = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 6))
-    dynamics.frames(terms, mounts, J, R, p, bias)
-    b[:] = bias[:, :3]
-    h[:] = terms[1]
+    frames = Frames(J, np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 6)))
+    frame_terms(terms, mounts, frames)
+    b[:] = frames.drift[:, :3]
+    h[:] = terms.nle
     if foot < 0:
         return
     rate, change = np.zeros(3), np.zeros(3)
     for a in range(3):
-        q[a] += anchor[foot, a] - p[foot, a]
+        q[a] += anchor[foot, a] - frames.p[foot, a]
         for c in range(v.size):
             rate[a] += J[foot, a, c] * v[c]
     for i in range(3):
         for a in range(3):
-            change[i] -= terms[3][1, a, i] * rate[a]
-    boost(v, terms[0], J, h, b, change)
+            change[i] -= terms.rotation[1, a, i] * rate[a]
+    boost(v, terms.M, J, h, b, change)
 
 
-@njit(cache=True)
-def foresee(tree, terms, mounts, q, v, motor, stance, foot, anchor, K, table, clock, ticks, ring,
+@entry
+def foresee(raw_tree, raw_terms, raw_mounts, q, v, motor, stance, foot, anchor, K, table, clock, ticks, ring,
             newest, tau_sea):  # fmt: skip
     """Estimate the measured state by the standing foot, and predict it; q, v and motor are moved.
 
     Args:
-        tree: as `sealag.robot.Robot.tree`.
-        terms: as `sealag.robot.Workspace.terms`, evaluated at the end.
-        mounts: of both feet, as `sealag.robot.Robot.frame_mounts`.
+        raw_tree: the robot.
+        raw_terms: its terms, evaluated at the end.
+        raw_mounts: of both feet.
         q: (13,) configuration.
         v: (12,) velocity.
         motor: (6, 2) angles and speeds.
@@ -170,10 +170,11 @@ def foresee(tree, terms, mounts, q, v, motor, stance, foot, anchor, K, table, cl
         newest: place of the newest command.
         tau_sea: (6,) spring torques then, written.
     """
+    tree, terms, mounts = Tree(*raw_tree), Terms(*raw_terms), Mounts(*raw_mounts)
     nv, n = v.size, K.size
     base = nv - n
     J, b, h = np.empty((2, 6, nv)), np.empty((2, 3)), np.empty(nv)
-    dynamics.evaluate(tree, q, v, terms)
+    rigid_body_terms(tree, q, v, terms)
     stand(terms, mounts, q, v, h, foot, anchor, J, b)
     moved = np.zeros(nv)
     if ticks > 0:
@@ -181,7 +182,7 @@ def foresee(tree, terms, mounts, q, v, motor, stance, foot, anchor, K, table, cl
         rows[0], rows[1] = J[1 - stance, :3], J[stance, :3]
         bias[0], bias[1] = b[1 - stance], b[stance]
         moved = predict(
-            terms[0], h, rows, bias, q[q.size - n :], v, motor, K, table, clock[0], clock[1],
+            terms.M, h, rows, bias, q[q.size - n :], v, motor, K, table, clock[0], clock[1],
             ticks, ring[0], ring[1], newest, clock[2], clock[3],
         )  # fmt: skip
     elif ticks < 0:
@@ -189,14 +190,4 @@ def foresee(tree, terms, mounts, q, v, motor, stance, foot, anchor, K, table, cl
     for j in range(n):
         tau_sea[j] = K[j] * (motor[j, 0] - q[q.size - n + j] - moved[base + j])
     integrate(q.copy(), moved, base, q)
-    dynamics.evaluate(tree, q, v, terms)
-
-
-def warm() -> None:
-    """Compile every kernel of this module."""
-    tree, terms, mounts, q, v, six = example()
-    foresee(
-        tree, terms, mounts, q, v, np.zeros((6, 2)), 0, 0, np.zeros((2, 3)), six,
-        np.zeros((6, 2, 4)), (0.0, 1e-3, 0.0, 0.0), 1, (np.zeros(4), np.zeros((4, 6))), 0,
-        six.copy(),
-    )  # fmt: skip
+    rigid_body_terms(tree, q, v, terms)

@@ -25,7 +25,7 @@ from sealag.whole_body import (
 )
 
 if TYPE_CHECKING:
-    from sealag.kernels.plant import Channels, Limits, Log
+    from sealag.kernels.plant import Channels, Limits, Log, Periods
 
 _WATCH = 5e-3  # s between two looks for a fall
 _AT_REST = 1e-12  # rad: how far the first motor angles may be from rest
@@ -252,9 +252,8 @@ class _Loop:
         }  # fmt: skip
         log = {name: shapes.get(name, (n,)) for name in self._kernel.Log._fields}
         refuse_large(rows, sum(math.prod(shape) for shape in log.values()))
-        whole = ("tick", "contact_mode")
         arrays = {
-            name: np.zeros((rows, *shape), np.int64 if name in whole else float)
+            name: np.zeros((rows, *shape), np.int64 if name in self._kernel.WHOLE else float)
             for name, shape in log.items()
         }
         arrays["time"][:] = np.nan
@@ -300,8 +299,20 @@ class _Loop:
         except KeyboardInterrupt:
             outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
         if not self._filled():
-            self._glide_for(0)
+            end, still = len(self._channels.due), self._periods._replace(steps=0)
+            self._enter((0.0, 0, end, self._kernel.CLOSE), still, math.inf)
         return self._result(outcome, message)
+
+    def _enter(
+        self, cursor: tuple[float, int, int, int], periods: "Periods", said: float
+    ) -> tuple[int, tuple[float, int, int, int]]:
+        """Enter the compiled loop at a raw cursor; return why it was left, and where."""
+        plant = self.plant
+        run = tuple(self._channels), tuple(periods), tuple(self._limits), plant.instant_feedback
+        return self._kernel.glide(
+            plant.raw, plant.raw_terms, plant.raw_instants, plant.raw_ledger, run,
+            tuple(self._log), cursor, said,
+        )  # fmt: skip
 
     def _filled(self) -> int:
         """How many instants are logged."""
@@ -310,15 +321,10 @@ class _Loop:
     def _glide(self, progress: Callable[[float], None] | None) -> None:
         """Go on from one thing that needs Python to the next, until the end."""
         kernel, plant, channels = self._kernel, self.plant, self._channels
-        named = (channels, self._periods, self._limits)
-        run, log = (*map(tuple, named), plant.instant_feedback), tuple(self._log)
         cursor = (0.0, 0, 0, kernel.WATCH)
         shown, every = 0, max(1, round(0.1 / self.clock.physics))
         while True:
-            why, cursor = kernel.glide(
-                plant.raw, plant.raw_terms, plant.raw_instants, plant.raw_ledger, run, log, cursor,
-                self._said,
-            )  # fmt: skip
+            why, cursor = self._enter(cursor, self._periods, self._said)
             time, step, event, part = cursor
             if why != kernel.BLOCKED:
                 plant.time = time

@@ -110,7 +110,7 @@ class WalkingController:
         self.step.start(
             t,
             phase=0.5 * (gait.step_time + gait.transfer_time),
-            com=np.array([body.com[0][2], body.com[1][2]]),
+            com=np.array([body.terms.com[2], body.terms.com_velocity[2]]),
             feet=feet,
             swing=body.foot_rate(1 - self.step.stance),
         )
@@ -136,7 +136,8 @@ class WalkingController:
         step, body = self.step, self._body
         phase = step.phase(now)
         self.placement.update(
-            phase, step, body.com[0], body.com[1], angular=body.angular, period=self._period
+            phase, step, body.terms.com, body.terms.com_velocity, angular=body.angular,
+            period=self._period,
         )
         if phase >= self.gait.transfer_time:
             if not step.swinging:
@@ -200,7 +201,7 @@ class WalkingController:
         body, step = self._body, self.step
         still = not self.options.acceleration_feedforward
         return self._kernel.law(
-            body.terms, body.mounts, body.v, body.gravity() if still else body.terms[1],
+            body.raw_terms, body.raw_mounts, body.v, body.gravity() if still else body.terms.nle,
             still, step.height, step.swing, phase,
             (self.gait.transfer_time, step.height_time(now)), step.stance, self._gains,
             self.tau_task, self._rates,

@@ -21,10 +21,10 @@ class Body:
     Attributes:
         q: Configuration (nq,).
         v: Velocity (nv,).
-        tree: The robot, as kernels take it.
-        terms: Its terms, as kernels take them.
-        mounts: How the feet are fixed, as kernels take it.
-        com: Position, velocity and acceleration at zero v̇ of the centre of mass (3, 3), live.
+        terms: Its rigid-body terms, live.
+        raw_tree: The robot, as kernels take it.
+        raw_terms: Its terms, likewise.
+        raw_mounts: How the feet are fixed, likewise.
         angular: Angular momentum about the centre of mass (3,), live.
     """
 
@@ -32,8 +32,8 @@ class Body:
         self._workspace, self._feet = robot.workspace(), feet
         at = self._workspace
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
-        self.tree, self.terms, self.mounts = robot.tree, at.terms, robot.frame_mounts(feet)
-        self.com, self.angular = self.terms[7], at.momentum[3:]
+        self.terms, self.raw_tree, self.raw_terms = at.terms, tuple(robot.tree), tuple(at.terms)
+        self.raw_mounts, self.angular = tuple(robot.frame_mounts(feet)), at.momentum[3:]
 
     def update(self) -> None:
         """Evaluate the terms at ``q`` and ``v``."""
@@ -128,7 +128,7 @@ class Estimator:
         self._motor[:, 0], self._motor[:, 1] = theta, theta_dot
         clock = measured, self._period, step.begin, step.begin + step.transfer_time
         self._kernel.foresee(
-            body.tree, body.terms, body.mounts, body.q, body.v, self._motor, step.stance,
+            body.raw_tree, body.raw_terms, body.raw_mounts, body.q, body.v, self._motor, step.stance,
             self._stance if self._odometry else -1, self._anchor, self._K, self._table, clock,
             ticks, self._ring, self._newest, self.tau_sea,
         )  # fmt: skip

@@ -1,6 +1,7 @@
 """The law evaluated at one configuration: compiled, with memory of its own."""
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from sealag.robot import Contact, Robot
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body._law import Law
 from sealag.whole_body._task_reader import read_tasks
+from sealag.whole_body._tank import EnergyTank, TankFlow
 from sealag.whole_body._tasks import (
     FORM_CODE,
     RANK_TOLERANCE,
@@ -16,6 +18,9 @@ from sealag.whole_body._tasks import (
     TaskError,
     TaskInertia,
 )
+
+if TYPE_CHECKING:
+    from sealag.kernels.control_law import Gains, Signal, Tasks
 
 SETTLED = 1e-12
 """rad: a smaller Newton step of q̄(θ) is the last. Ten times larger shows in differences of the
@@ -67,11 +72,11 @@ class LawEvaluation:
             UnknownNameError: a frame or joint does not exist.
             RobotError: the mass matrix at the posture is not positive definite.
         """
-        from sealag.kernels import control_law, operational_space
+        from sealag.kernels import control_law
 
         self._kernel = control_law
         self.robot, self.law, self.spring_stiffness = robot, law, spring_stiffness
-        frames, self._tasks = read_tasks(robot, law, contacts, posture=posture)
+        frames, tasks = read_tasks(robot, law, contacts, posture=posture)
         gains = control_law.Gains(
             K_x=law.gain(robot),
             planned_gravity=np.zeros(robot.n),
@@ -82,26 +87,36 @@ class LawEvaluation:
             consistent=law.task_error is TaskError.CONSISTENT,
             fed_back=law.gravity is GravityCompensation.FEEDBACK,
         )
-        self.planned_gravity = gains.planned_gravity
-        self._raw = self._allocate(frames, gains)
+        self.planned_gravity, self._measured = gains.planned_gravity, self.running()
+        self._raw = self._allocate(frames, tasks, gains)
         self.follow(np.asarray(posture, dtype=float))
         if law.gravity is GravityCompensation.PLANNED:
             self.planned_gravity[:] = self.space.gravity
 
-    def _allocate(self, frames: list[str]) -> None:
-        robot = self.robot
-        nv, n, c, m = self._sizes
-        self._terms = robot.workspace().terms
-        self._seen = (
-            *robot.frame_mounts(frames), np.zeros((len(frames), 6, nv)),
-            np.zeros((len(frames), 3, 3)), np.zeros((len(frames), 3)), np.zeros((len(frames), 6)),
+    def _allocate(self, frames: list[str], tasks: "Tasks", gains: "Gains") -> tuple[Any, ...]:
+        """Allocate memory for all that is evaluated; return the law as kernels take it."""
+        from sealag.kernels import dynamics, operational_space
+
+        robot, kernel = self.robot, self._kernel
+        nv, n, c, m = robot.nv, robot.n, len(tasks.contact_row), len(tasks.row)
+        memory = np.zeros(operational_space.memory_size(nv, n, c, m))
+        self.space = operational_space.divide(memory, nv, n, c, m)
+        self._terms = dynamics.allocate(robot.tree)
+        self._at = kernel.Evaluation(
+            along=np.zeros((nv, n)), offset=np.zeros(m), shift=np.zeros(nv), q=np.zeros(robot.nq),
+            J_s=np.zeros((c, nv)), J_t=np.zeros((m, nv)), error=np.zeros(m), wanted=np.zeros(m),
         )  # fmt: skip
-        self._J_t, self._J_s = np.zeros((m, nv)), np.zeros((c, nv))
-        self.error, self.offset, self.wanted = np.zeros(m), np.zeros(m), np.zeros(m)
-        self._motion, self._along = np.zeros(nv), np.zeros((nv, n))
-        self.planned_gravity, self._unused = np.zeros(n), np.zeros(n)
-        self._step, self._square = np.zeros(n), np.zeros((n, n))
-        self._slope, self._slopes = np.zeros((n, n)), (np.zeros((nv, nv)), np.zeros((nv, n)))
+        self.error, self.offset, self.wanted = self._at.error, self._at.offset, self._at.wanted
+        newton = kernel.Newton(
+            H=np.zeros((nv, nv)), moved=np.zeros((nv, n)), slope=np.zeros((n, n)),
+            J=np.zeros((m, n)), square=np.zeros((n, n)), step=np.zeros(n),
+        )  # fmt: skip
+        self._newton, self._levels, self._unused = newton, tasks.levels, np.zeros(n)
+        parts = (
+            robot.tree, robot.frame_mounts(frames), tasks, gains, self._terms,
+            dynamics.allocate_frames(len(frames), nv), self._at, newton,
+        )  # fmt: skip
+        return (*map(tuple, parts), memory)
 
     @property
     def rows(self) -> int:
@@ -128,7 +143,7 @@ class LawEvaluation:
 
     def keep_following(self) -> None:
         """Take overline(UN_s) from where the law was last evaluated."""
-        self._along[:] = self.space.joint_from_base
+        self._at.along[:] = self.space.joint_from_base
 
     def at(self, q: Array, joints: Array, out: Array) -> None:
         """Evaluate at a measured configuration (nq,) moved to joint angles (n,); l into out (n,).
@@ -136,13 +151,53 @@ class LawEvaluation:
         Raises:
             RobotError: the mass matrix is not positive definite.
         """
-        good = self._kernel.law(
-            self.robot.tree, self._terms, self._seen, self._tasks, self._gains,
-            (q, joints, self._along, self.offset),
-            (self._J_s, self._J_t, self.error, self.wanted, out), self._memory, self._sizes,
-        )  # fmt: skip
-        if not good:
+        self.tick(self._measured, 0.0, q, joints, out)
+
+    def tick(self, signal: "Signal", period: float, q: Array, angles: Array, out: Array) -> None:
+        """Evaluate at a running signal, which moves.
+
+        Args:
+            signal: the signal.
+            period: since the last tick, s.
+            q: (nq,) measured configuration.
+            angles: (n,) joint angles of a measured signal, motor angles of another one, rad.
+            out: (n,) torque, Nm, written.
+
+        Raises:
+            ContractionError: q̄(θ) does not exist, or is not found.
+            RobotError: the mass matrix is not positive definite.
+        """
+        status = self._kernel.tick(self._raw, tuple(signal), period, q, angles, out)
+        if status == self._kernel.SINGULAR_MASS:
             raise RobotError(f"The mass matrix of {self.robot.name} is not positive definite.")
+        if status == self._kernel.NO_STATIC_STATE:
+            raise self._without_static_state(float(np.abs(self._newton.step).max()))
+
+    def running(
+        self, *, sag: Array | None = None, iterations: int = 1, tank: EnergyTank | None = None
+    ) -> "Signal":
+        """Return a running signal: angles as measured, q̄(θ) from a sag (n,) on, or x̂ of a tank.
+
+        Args:
+            sag: (n,) q̄ − θ, a first guess that is moved, rad; None for measured angles.
+            iterations: Newton steps towards q̄(θ) at most.
+            tank: lets x̂ follow x(q̄(θ)).
+        """
+        kernel, n = self._kernel, self.robot.n
+        kind = kernel.MEASURED if sag is None else kernel.STATIC
+        if tank is None:
+            tank = EnergyTank(
+                rows=0, joints=0, energy=0.0, rate=0.0, delay_bound=0.0, flow=TankFlow.CORRECTED
+            )
+        else:
+            kind = kernel.TANK
+        position, theta, energy, started = tank.memory
+        return kernel.Signal(
+            kind=kind, sag=np.zeros(n) if sag is None else sag, iterations=iterations,
+            settled=SETTLED, diverged=DIVERGED, position=position, theta=theta, energy=energy,
+            started=started, rate=tank.rate, delay_bound=tank.delay_bound,
+            corrected=tank.flow is TankFlow.CORRECTED,
+        )  # fmt: skip
 
     def settled(self, evaluate: Callable[[], None], away: Callable[[], Array]) -> None:
         """Evaluate again until overline(UN_s) is that of the configuration evaluated.
@@ -153,63 +208,36 @@ class LawEvaluation:
         """
         for _ in range(_REPEATS):
             evaluate()
-            turned = np.abs((self.space.joint_from_base - self._along) @ away()).max(initial=0.0)
+            turned = np.abs((self.space.joint_from_base - self._at.along) @ away()).max(initial=0.0)
             self.keep_following()
             if turned < SETTLED:
                 return
 
     def torque(self, out: Array) -> None:
         """Write l (n,) of the current error and matrices."""
-        gravity = self.space.gravity if self.gravity_is_fed_back else self.planned_gravity
-        self._kernel.task_torque(self.space.J_star, self.space.stiffness, self.error, gravity, out)
+        self._kernel.torque(self._raw, out)
 
     def leave_to_higher(self, rate: Array) -> None:
         """Project the rates (m,) of the tasks into the null space of the higher tasks, in place."""
         if len(self._levels) > 2:
             self._kernel.leave_to_higher(
-                self._J_t, self.space.lift, self._levels, rate, self._motion
+                self._at.J_t, self.space.lift, self._levels, rate, self._at.shift
             )
 
     def static(self, q: Array, theta: Array, sag: Array, iterations: int, out: Array) -> None:
-        """Evaluate at q̄(θ) of Eqs. (15), (16), by Newton's method from a sag q̄ − θ, in place.
-
-        The springs carry the law there, l(q̄) = K (θ − q̄) = −K sag, so that the last step needs no
-        new evaluation.
+        """Evaluate at q̄(θ) of Eqs. (15), (16), by Newton's method from a sag q̄ − θ, moved.
 
         Raises:
             ContractionError: q̄(θ) does not exist, or is not found.
+            RobotError: the mass matrix is not positive definite.
         """
-        K, space, step = self.spring_stiffness, self.space, self._step
-        for _ in range(iterations):
-            self.at(q, theta + sag, out)
-            if self.gravity_is_fed_back:
-                self._kernel.gravity_slope(
-                    self.robot.tree, self._terms, space.joint_from_base, *self._slopes, self._slope
-                )
-            exists = self._kernel.static_step(
-                space.J_star,
-                self._moved(),
-                space.stiffness,
-                self._slope,
-                K,
-                out,
-                sag,
-                self._square,
-                step,
-            )
-            size = float(np.abs(step).max())
-            if not (exists and size < DIVERGED):
-                raise self._without_static_state(size)
-            if size < SETTLED:
-                break
-        out[:] = -K * sag
-        self.error -= self._moved() @ step
+        self.tick(self.running(sag=sag, iterations=iterations), 0.0, q, theta, out)
 
     def _moved(self) -> Array:
         """Minus the errors' Jacobian (m, n) by joint angles, where the law was last evaluated."""
         if self.law.task_error is TaskError.CONSISTENT:
             return self.space.J_star
-        return self._J_t @ self.space.joint_from_base
+        return self._at.J_t @ self.space.joint_from_base
 
     def _without_static_state(self, step: float) -> ContractionError:
         if self.contraction >= 1.0:
@@ -225,9 +253,11 @@ class LawEvaluation:
 
     def work_of_gravity(self, q: Array, joints: Array) -> float:
         """Return U_g of a measured configuration plus ∫ ḡᵀ dq_j from there to joint angles, J."""
+        from sealag.kernels.dynamics import POTENTIAL
+
         away = joints - self.robot.joint_positions(q)
         self.at(q, self.robot.joint_positions(q), self._unused)
-        work = float(self._terms[10][1])
+        work = float(self._terms.energy[POTENTIAL])
         for place, weight in _GAUSS:
             self.at(q, self.robot.joint_positions(q) + place * away, self._unused)
             work += weight * float(self.space.gravity @ away)

@@ -204,9 +204,11 @@ class StaticState:
 
     tank_energy = 0.0
 
-    def __init__(self, law: "LawEvaluation", iterations: int) -> None:
-        self._law, self._iterations = law, iterations
-        self._sag = np.zeros(law.robot.n)
+    def __init__(
+        self, law: "LawEvaluation", iterations: int, tank: EnergyTank | None = None
+    ) -> None:
+        self._law, self._sag = law, np.zeros(law.robot.n)
+        self._running = law.running(sag=self._sag, iterations=iterations, tank=tank)
 
     def reset(self, t: float, measurement: Measurement) -> None:
         """Start q̄(θ) at the measured joint angles."""
@@ -215,7 +217,11 @@ class StaticState:
 
     def command(self, t: float, measurement: Measurement, out: Array) -> None:
         """Write τ_osc, with a few Newton steps from the last q̄."""
-        self._law.static(measurement.q, measurement.theta, self._sag, self._iterations, out)
+        self.tick(0.0, measurement, out)
+
+    def tick(self, period: float, measurement: Measurement, out: Array) -> None:
+        """Write τ_osc a period (s) after the last one."""
+        self._law.tick(self._running, period, measurement.q, measurement.theta, out)
 
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command at the settled q̄: V_3 at q̄ less ½ lᵀ K⁻¹ l."""
@@ -246,9 +252,8 @@ class TankState:
     """x̂ of the energy tank; u pulls it to x(q̄(θ))."""
 
     def __init__(self, law: "LawEvaluation", tank: EnergyTank, iterations: int) -> None:
-        self._law, self._tank, self._static = law, tank, StaticState(law, iterations)
-        n = law.robot.n
-        self._theta, self._last, self._unused = np.zeros(n), 0.0, np.zeros(n)
+        self._law, self._tank, self._static = law, tank, StaticState(law, iterations, tank)
+        self._last, self._unused = 0.0, np.zeros(law.robot.n)
 
     @property
     def tank_energy(self) -> float:
@@ -263,23 +268,8 @@ class TankState:
 
     def command(self, t: float, measurement: Measurement, out: Array) -> None:
         """Write τ_osc at x̂, which follows the motors and, while the tank pays, x(q̄(θ))."""
-        law, tank = self._law, self._tank
-        self._static.command(t, measurement, out)
-        target = law.wanted - law.error
-        self._matrices(measurement.q, measurement.theta)
-        if tank.started:
-            tank.step(
-                t - self._last,
-                law.space.J_star @ (measurement.theta - self._theta),
-                wanted=law.wanted,
-                target=target,
-                stiffness=law.space.stiffness,
-            )
-        else:
-            tank.start(target)
-        self._theta[:], self._last = measurement.theta, t
-        law.error[:] = law.wanted - tank.position
-        law.torque(out)
+        self._static.tick(t - self._last, measurement, out)
+        self._last = t
 
     def _matrices(self, q: Array, theta: Array) -> None:
         """Evaluate fed-back gravity compensation at θ, so that its gradient is that of F_q."""
@@ -292,7 +282,7 @@ class TankState:
         energy, _ = self._static.present(measurement, out)
         self._matrices(measurement.q, measurement.theta)
         if tank.started:
-            carried = law.space.J_star @ (measurement.theta - self._theta)
+            carried = law.space.J_star @ (measurement.theta - tank.theta)
             law.error[:] = law.wanted - tank.position - carried
         law.torque(out)
         energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy

@@ -201,7 +201,8 @@ class Tank(Signal):
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
         tank = EnergyTank(
-            size=law.rows,
+            rows=law.rows,
+            joints=law.robot.n,
             energy=self.energy,
             rate=self.rate,
             delay_bound=delay_bound,

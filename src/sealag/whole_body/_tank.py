@@ -4,7 +4,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from sealag.typing import Array
+from sealag.typing import Array, IntArray
 
 
 class TankFlow(StrEnum):
@@ -36,63 +36,44 @@ class EnergyTank:
     """
 
     def __init__(
-        self, *, size: int, energy: float, rate: float, delay_bound: float, flow: TankFlow
-    ) -> None:
+        self, *, rows: int, joints: int, energy: float, rate: float, delay_bound: float,
+        flow: TankFlow,
+    ) -> None:  # fmt: skip
         """Fill a tank.
 
         Args:
-            size: number of task rows m.
+            rows: number of task rows m.
+            joints: number of joints n.
             energy: J at the start.
             rate: at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s.
             delay_bound: d̄, s.
             flow: what the tank pays for.
         """
-        self._first, self.rate = energy, rate
-        self._delay_bound, self._flow = delay_bound, flow
-        self.position = np.zeros(size)
-        self.energy = energy
-        self.started = False
+        self.rate, self.delay_bound, self.flow, self._first = rate, delay_bound, flow, energy
+        self.position, self.theta = np.zeros(rows), np.zeros(joints)
+        self._energy, self._started = np.full(1, energy), np.zeros(1, np.int64)
+
+    @property
+    def memory(self) -> tuple[Array, Array, Array, IntArray]:
+        """x̂ (m,), motor angles at the last step (n,), energy (1,), and whether x̂ is somewhere
+        (1,); live."""
+        return self.position, self.theta, self._energy, self._started
 
     @property
     def can_pay(self) -> bool:
         """Whether a full tank moves x̂ at all."""
         return self._first > 0.0 and self.rate > 0.0
 
+    @property
+    def energy(self) -> float:
+        """Energy left, J, never below 0."""
+        return float(self._energy[0])
+
+    @property
+    def started(self) -> bool:
+        """Whether x̂ is somewhere."""
+        return bool(self._started[0])
+
     def reset(self) -> None:
         """Fill the tank and forget x̂."""
-        self.energy, self.started = self._first, False
-
-    def start(self, position: Array) -> None:
-        """Begin at a task position.
-
-        Args:
-            position: (m,) x(q̄(θ)), from the posture's own.
-        """
-        self.position[:] = position
-        self.started = True
-
-    def step(
-        self, period: float, moved: Array, *, wanted: Array, target: Array, stiffness: Array
-    ) -> None:
-        """Move x̂ over one period, and the energy with it.
-
-        Args:
-            period: T since the last step, s; at 0 or less u does nothing.
-            moved: (m,) J* Δθ.
-            wanted: (m,) x_d.
-            target: (m,) x(q̄(θ)), which u moves x̂ to.
-            stiffness: (m, m) S, symmetric.
-        """
-        if period > 0.0:
-            # u of the exact solution of x̂̇ = rate (target − x̂), so that no period is too long.
-            pull = -np.expm1(-self.rate * period) / period
-            u = pull * (target - self.position - moved)
-            force = stiffness @ u
-            flow = -self._delay_bound * float(force @ (0.5 * period * u + moved))
-            if self._flow is TankFlow.CORRECTED:
-                half = wanted - self.position - 0.5 * (period * u + moved)
-                flow += period * float(force @ half)
-            if self.energy + flow >= 0.0:
-                self.energy += flow
-                self.position += period * u
-        self.position += moved
+        self._energy[0], self._started[0] = self._first, 0

@@ -1,22 +1,21 @@
 """Contacts and tasks about a posture, as the compiled law takes them."""
 
-from typing import TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sealag.errors import InputError
 from sealag.robot import Contact, Robot
-from sealag.typing import Array, ArrayLike, IntArray
+from sealag.typing import ArrayLike
 from sealag.whole_body._law import Law
 from sealag.whole_body._tasks import TaskKind
 
-TaskArrays: TypeAlias = tuple[IntArray, IntArray, IntArray, Array, Array, Array]
-"""As ``tasks`` of `sealag.kernels.control_law.law`."""
-
+if TYPE_CHECKING:
+    from sealag.kernels.control_law import Tasks
 
 def read_tasks(
     robot: Robot, law: Law, contacts: tuple[Contact, ...], *, posture: ArrayLike
-) -> tuple[list[str], TaskArrays]:
+) -> tuple[list[str], "Tasks"]:
     """Return the tasks' references: their positions in a posture, where all errors are 0.
 
     Args:
@@ -32,7 +31,7 @@ def read_tasks(
         InputError: the posture has another shape.
         UnknownNameError: a frame or joint does not exist.
     """
-    from sealag.kernels.control_law import OF_FRAME, OF_JOINT, OF_MASS
+    from sealag.kernels.control_law import OF_FRAME, OF_JOINT, OF_MASS, Tasks
 
     q = np.asarray(posture, dtype=float)
     if q.shape != (robot.nq,):
@@ -51,11 +50,18 @@ def read_tasks(
         rows += [(kind, frame, row) for row in chosen.rows]
         values += [float(whole[row]) for row in chosen.rows]
     placed = [robot.frame_placement(name, q) for name in names]
-    return names, (
-        np.array(held, dtype=np.int64).reshape(-1, 2),
-        np.array(rows, dtype=np.int64).reshape(-1, 3),
-        np.array(law.levels(robot)),
-        np.array([rotation for rotation, _ in placed]).reshape(-1, 3, 3),
-        np.array([position for _, position in placed]).reshape(-1, 3),
-        np.array(values),
+    held_rows = np.array(held, dtype=np.int64).reshape(-1, 2).T
+    task_rows = np.array(rows, dtype=np.int64).reshape(-1, 3).T
+    contact_frame, contact_row = np.ascontiguousarray(held_rows)
+    kinds, frame_of, row_of = np.ascontiguousarray(task_rows)
+    return names, Tasks(
+        contact_frame=contact_frame,
+        contact_row=contact_row,
+        kind=kinds,
+        frame=frame_of,
+        row=row_of,
+        levels=np.array(law.levels(robot)),
+        R=np.array([rotation for rotation, _ in placed]).reshape(-1, 3, 3),
+        p=np.array([position for _, position in placed]).reshape(-1, 3),
+        x=np.array(values),
     )
