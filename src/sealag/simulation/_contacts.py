@@ -7,8 +7,9 @@ import numpy as np
 
 from sealag.errors import InputError
 from sealag.robot import Robot
-from sealag.simulation._ground import Foot, Ground, contact_frame, ground_profile
+from sealag.simulation._ground import Foot, contact_frame
 from sealag.typing import IntArray
+from sealag.walking import Ground, GroundProfile
 
 if TYPE_CHECKING:
     from sealag.kernels.contact import Instant
@@ -48,8 +49,8 @@ class Surroundings:
         self.foot_of = np.repeat(np.arange(len(feet)), [len(o) for o in offsets]).astype(np.int64)
         self.count, loaded = self.foot_of.size, len(loaded_frames)
         owners = [self.feet[f] for f in self.foot_of.tolist()]
-        profile = ground_profile(ground)
-        x, z = profile or (np.zeros(0), np.zeros(0))
+        # Only a profile's height is known to the kernels; another ground is asked at every step.
+        known = ground if isinstance(ground, GroundProfile) else None
         self.contacts = contact.Contacts(
             frame=np.concatenate([self.foot_of, len(feet) + np.arange(loaded)]).astype(np.int64),
             offset=np.concatenate([*offsets, np.zeros((loaded, 3))]),
@@ -64,11 +65,11 @@ class Surroundings:
             closed=np.zeros(self.count, np.int64),
             yielding=np.zeros(self.count),
             floor=np.zeros(self.count),
-            ground_x=x,
-            ground_z=z,
+            ground_x=np.zeros(0) if known is None else np.array(known.x),
+            ground_z=np.zeros(0) if known is None else np.array(known.z),
             stabilisation=stabilisation,
             stop_time=stop_time,
-            weight=robot.mass * 9.81,
+            weight=robot.weight,
         )
 
     def open_all(self) -> None:

@@ -17,9 +17,10 @@ from sealag.actuation import Actuators, motors_of
 from sealag.errors import InputError
 from sealag.robot import Robot
 from sealag.simulation._contacts import Surroundings
-from sealag.simulation._ground import FlatGround, Foot, Ground
+from sealag.simulation._ground import Foot
 from sealag.simulation._outcome import EventKind, Outcome, PlantStop
 from sealag.typing import Array, IntArray
+from sealag.walking import Ground, GroundProfile
 
 if TYPE_CHECKING:
     from sealag.kernels.contact import Instant
@@ -93,7 +94,7 @@ class Plant:
         self._kernel, self._contact, self._friction = plant, contact, friction
         self.robot, self.actuators, self.step_length = robot, actuators, step
         self.surroundings = Surroundings(
-            robot, feet, ground or FlatGround(), loaded_frames, stabilisation=stabilisation,
+            robot, feet, ground or GroundProfile(), loaded_frames, stabilisation=stabilisation,
             stop_time=step,
         )  # fmt: skip
         self.contacts, mounts = self.surroundings.contacts, self.surroundings.mounts

@@ -125,15 +125,18 @@ class _Search:
         self._signal: SignalState = law.signal.start(evaluation, delay_bound=0.0)
         self._plant = LinkPlant(robot, contacts)
         self._places = self._plant.places(self._posture)
-        self._scale = max(9.81 * robot.mass, float(np.abs(robot.gravity(posture)).max()), 1e-3)
+        self._scale = max(robot.weight, float(np.abs(robot.gravity(posture)).max()), 1e-3)
 
     def run(self) -> Rest:
         """Return the equilibrium; without one the posture, with the reason."""
         if self._robot.floating_base and not self._places:  # nothing holds the robot: it falls
             return self._answer(self._posture, self._held(), self._why())
+        posture = self.posture()
+        if posture.found and self._evaluation.law.rests_at_posture:
+            return posture
         try:
             # Where contacts do not balance the posture, its margin is 0 wherever the loop rests.
-            for falling in (True, False) if self.posture().found else (True,):
+            for falling in (True, False) if posture.found else (True,):
                 found = self._follow(falling=falling)
                 if found is not None:
                     return self._answer(*found, "")
