@@ -190,7 +190,10 @@ def test_law_is_its_parts_one_after_the_other():
     )  # fmt: skip
     chosen = replace(chosen, gravity=GravityCompensation.FEEDBACK)
     law = LawEvaluation(robot, chosen, np.ones(6), contacts=CONTACTS, posture=posture)
-    q, law.offset[:] = robot.integrate(posture, 0.05 * rng.normal(size=12)), 0.01 * rng.normal(size=7)
+    q, law.offset[:] = (
+        robot.integrate(posture, 0.05 * rng.normal(size=12)),
+        0.01 * rng.normal(size=7),
+    )
     joints, out = q[-6:] + 0.02 * rng.normal(size=6), np.zeros(6)
     law.follow(posture)
     along = law.space.joint_from_base.copy()

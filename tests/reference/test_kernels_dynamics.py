@@ -47,7 +47,9 @@ def instant(urdf, request):
         q[:3] += 50.0
     v, data, terms = rng.normal(size=model.nv), model.createData(), dynamics.allocate(robot.tree)
     for _ in range(2):
-        dynamics.evaluate(tuple(robot.tree), q, v, tuple(terms))  # nothing is left from the first time
+        dynamics.evaluate(
+            tuple(robot.tree), q, v, tuple(terms)
+        )  # nothing is left from the first time
     pin.computeAllTerms(model, data, q, v)
     return robot, q, v, terms, data
 

@@ -153,7 +153,13 @@ def test_prediction_against_its_plain_twin(terms, begin, end):
     )  # fmt: skip
     speed, drive = v.copy(), motor.copy()
     moved = predict(
-        M, h, J, b, q, speed, drive, K, table, 0.0, 1e-3, 15, arrival, command, 10 % 8, begin, end
+        walking_state.Links(M, h, J, b),
+        q,
+        speed,
+        drive,
+        walking_state.Springs(K, table),
+        walking_state.Timing(0.0, 1e-3, 15, begin, end),
+        walking_state.Flight(arrival, command, 10 % 8),
     )
     for got, wanted in zip((moved, speed, drive), expected, strict=True):
         np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9)
@@ -165,15 +171,17 @@ def test_foothold_against_its_plain_twin(side):
     height = np.array([0.88, 0.1, 0.0, 0.0, 0.0, 0.0])
     old, new, com = np.array([-0.2, 0.2, 0.0]), np.zeros(3), np.array([-0.05, 0.1, 0.9])
     speed, momentum = np.array([0.5, -0.1, 0.0]), np.array([0.02, -0.01])
-    gait = np.array([0.35, 0.06, 3.4, 3.3, 1.4, 0.2, 0.1, -0.15, 0.55, 0.12, 0.5, side])
+    gait = walking.Gait(
+        step_time=0.35, transfer_time=0.06, rate=3.4, growth=3.3, carried=1.4, end_forward=0.2,
+        end_outward=0.1, nearest=-0.15, farthest=0.55, narrowest=0.12, widest=0.5, side=side,
+    )  # fmt: skip
+    step = walking.StepNow(old, new, height, 0.02, 0.1)
     memory = np.array([[0.1, 0.05], [0.6, 0.2]])
     x, v = com[:2].copy(), speed[:2] + momentum
     pendulum(x, v, 0.1, 0.35, 0.06, old, new, height, 0.02, 16)
     end = memory + 0.3 * (np.array([x, v]) - memory)
     u = (3.3 * (end[0] + end[1] / 3.4) - [0.2, -side * 0.1]) / (3.3 - 1.4)
-    place = walking.capture_end(
-        com, speed, momentum, old, new, height, 0.02, 0.1, gait, 0.3, memory
-    )
+    place = walking.capture_end(com, speed, momentum, tuple(step), tuple(gait), 0.3, memory)
     np.testing.assert_allclose(memory, end)
     np.testing.assert_allclose(
         place, [np.clip(u[0], -0.15, 0.55), side * np.clip(side * u[1], 0.12, 0.5)]
@@ -182,10 +190,10 @@ def test_foothold_against_its_plain_twin(side):
 
 def test_swing_moves_along_the_quintics_and_lands():
     """From rest to rest at the target, clear of the ground, derivatives by differences."""
-    gait, target = np.array([0.35, 0.06, 0.93, 0.3]), np.array([0.4, -0.1, 0.03])
+    plan, target = (0.35, 0.06, 0.93, 0.3), np.array([0.4, -0.1, 0.03])
     now, rows = np.zeros((3, 3)), []
     for i in range(60, 351):
-        walking.swing(now, target, i * 1e-3, 1e-3, gait, 0.0, 0.08)
+        walking.swing(now, target, i * 1e-3, 1e-3, plan, 0.0, 0.08)
         rows.append(now.copy())
     path = np.array(rows)
     np.testing.assert_allclose(path[-2, 0], target, atol=1e-3)
@@ -236,8 +244,11 @@ def test_extrapolation_and_springs(hume):
     there, rate, tau, K = q.copy(), v.copy(), np.zeros(N), np.full(N, 350.0)
     motor, ring = np.column_stack([q[-N:] + 0.1, v[-N:]]), (np.zeros(4), np.zeros((4, N)))
     walking_state.foresee(
-        tuple(robot.tree), tuple(at.terms), tuple(robot.frame_mounts(FEET)), there, rate, motor, 0, -1,
-        np.zeros((2, 3)), K, np.zeros((N, 2, 4)), (0.0, 1e-3, 0.0, 0.0), -20, ring, 0, tau,
+        (tuple(robot.tree), tuple(at.terms), tuple(robot.frame_mounts(FEET))),
+        tuple(walking_state.Support(stance=0, foot=-1, anchor=np.zeros((2, 3)))),
+        tuple(walking_state.Springs(K, np.zeros((N, 2, 4)))),
+        tuple(walking_state.Timing(0.0, 1e-3, ticks=-20, touchdown=0.0, lift_off=0.0)),
+        tuple(walking_state.Flight(*ring, newest=0)), there, rate, motor, tau,
     )  # fmt: skip
     expected = robot.integrate(q, 0.02 * v)
     np.testing.assert_allclose(there, expected, atol=1e-12)
@@ -252,13 +263,18 @@ def test_law_against_its_plain_twin(hume, phase):
     robot, _, v, at = hume
     rng = np.random.default_rng(8)
     height, swing = np.array([0.9, 0.1, 0.2, 0.0, 0.0, 0.0]), rng.normal(size=(3, 3))
-    gains = np.array([100.0, 110.0, 400.0, 10.0, 11.0, 20.0, 0.8, 10.0, 1e-14])
+    gains = walking_law.Gains(
+        height_stiffness=100.0, posture_stiffness=110.0, swing_stiffness=400.0, height_damping=10.0,
+        posture_damping=11.0, swing_damping=20.0, planned=0.8, position_rate=10.0, damping=1e-14,
+    )  # fmt: skip
     tau, rates, transfer = np.zeros(N), np.zeros(N), 0.06
     com = at.com, at.com_velocity, at.com_bias(), at.com_jacobian()
-    assert walking_law.law(
-        tuple(at.terms), tuple(robot.frame_mounts(FEET)), v, at.nle, False, height, swing, phase,
-        (transfer, 0.1), 0, gains, tau, rates,
+    wish = walking_law.Reference(
+        height=height, height_time=0.1, swing=swing, phase=phase, transfer_time=transfer, stance=0,
+        still=False,
     )  # fmt: skip
+    body = tuple(at.terms), tuple(robot.frame_mounts(FEET))
+    assert walking_law.law(body, v, at.nle, tuple(wish), tuple(gains), tau, rates)
     z = 0.9 + 0.01 + 0.002, 0.1 + 0.04, 0.4
     R = at.terms.rotation[1]
     yaw = np.arctan2(R[1, 0], R[0, 0])
@@ -302,10 +318,10 @@ def test_command_against_its_plain_twin():
     clipped = np.clip(tau, -0.8, 0.8)
     average = clipped + 0.7 * (smooth - clipped)
     plain = average + ratio * (clipped - average) / 5e-3 + D * rates + 0.5 * (clipped - sea)
-    gains = np.array([0.7, 5e-3, 1.0, 0.5])
-    walking_law.carry(tau, limit, smooth, rates, sea, D, ratio, gains, command)
+    lead = walking_law.Lead(keep=0.7, time=5e-3, forward=1.0, feedback=0.5)
+    walking_law.carry(tau, limit, smooth, rates, sea, D, ratio, tuple(lead), command)
     np.testing.assert_allclose(command, plain)
     np.testing.assert_allclose(smooth, average)
-    gains[1:] = 0.0
-    walking_law.carry(tau, limit, smooth, rates, sea, D, ratio, gains, command)
+    lead = lead._replace(time=0.0, forward=0.0, feedback=0.0)
+    walking_law.carry(tau, limit, smooth, rates, sea, D, ratio, tuple(lead), command)
     np.testing.assert_allclose(command, clipped)

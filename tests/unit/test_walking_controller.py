@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from helpers.kernels import from_python
 from humanoids2016 import NoisySensors, SensorNoise, WalkCase, simulate_walk, wrong_robot
 from sealag.design import load
 from sealag.errors import InputError
 from sealag.kernels import walking as kernel
-from helpers.kernels import from_python
 from sealag.simulation import Outcome
 from sealag.walking import GroundProfile, WalkingGait, WalkingOptions, begin_walk
 from sealag.whole_body import Measurement

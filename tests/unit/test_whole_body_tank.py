@@ -5,7 +5,9 @@ import pytest
 from scipy.linalg import expm
 
 from helpers.chains import planar_arm, wheel
+from helpers.kernels import from_python
 from sealag.actuation import actuators
+from sealag.kernels import control_law
 from sealag.whole_body import (
     Controller,
     GravityCompensation,
@@ -17,8 +19,6 @@ from sealag.whole_body import (
     Task,
     TaskKind,
 )
-from helpers.kernels import from_python
-from sealag.kernels import control_law
 
 STEP = 1e-3
 M, K, B_S, D, K_Q = 1.0, 350.0, 0.09, 10.0, 100.0

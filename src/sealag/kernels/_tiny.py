@@ -116,7 +116,6 @@ def _tick() -> None:
     )  # fmt: skip
     out = one.copy()
     control_law.tick(raw, tuple(signal), 1e-3, q, one, out)
-    control_law.torque(raw, out)
     control_law.leave_to_higher(at.J_t, np.zeros((1, nv)), tasks.levels, out, np.zeros(nv))
 
 
@@ -144,20 +143,15 @@ def _instant() -> contact.Instant:
 
 def _step() -> None:
     raw, raw_terms = _plant(), tuple(dynamics.allocate(_tree(1)))
-    contacts, instants = raw[-1], (tuple(_instant()), tuple(_instant()))
+    instants = tuple(_instant()), tuple(_instant())
     now, _ = instants
-    contact.evaluate(raw, raw_terms, now)
-    mask, impulse = np.ones(1, np.int64), np.zeros((1, 3))
-    contact.resolve(raw, raw_terms, now, mask, False, impulse)
-    contact.margin(contacts, now)
-    row = np.zeros(1 + _NQ + _NV + 3 + 1)
-    contact.sense(contacts, now, 0.0, row)
+    closed, three = np.ones(1, np.int64), np.zeros((1, 3))
+    contact.smallest_margin(np.eye(3)[None], closed, 1.0, three, np.zeros(1), three)
+    contact.sense(now, closed, closed, 0.0, np.zeros(1 + _NQ + _NV + 3 + 2))
     books = tuple(Ledger(np.zeros((9, 1)), np.zeros(5), np.zeros(4), np.zeros(1)))
     held = plant.Held(command=np.zeros(1), known_torque=np.zeros(1), instant=True)
-    plant.begin_books(raw, now, books)
-    plant.advance(raw, raw_terms, instants, tuple(held), 1e-3, books)
-    plant.accept(raw, instants, books, books)
-    plant.book_impact(raw, now, 0.0, books)
+    plant.act(raw, raw_terms, instants, plant.STEP, tuple(held), 1e-3, books, closed, three)
+    plant.update_stores(raw[2], now, books)
     motor.rate_rows(raw[2], True, np.zeros((6, 1)), np.zeros((6, 1)))
     _glide(raw, raw_terms, instants, books)
 
@@ -180,9 +174,7 @@ def _glide(raw: Any, raw_terms: Any, instants: Any, books: Any) -> None:
     }  # fmt: skip
     log = plant.Log(
         **{
-            name: np.zeros(
-                (1, *shapes.get(name, (1,))), np.int64 if name in plant.WHOLE else float
-            )
+            name: np.zeros((1, *shapes.get(name, (1,))), np.int64 if name in plant.WHOLE else float)
             for name in plant.Log._fields
         }
     )
@@ -195,19 +187,20 @@ def _walk() -> None:
     terms, q, v = tuple(dynamics.allocate(tree)), _upright(6), np.zeros(12)
     walking.quintic(three, three, 1.0, six)
     walking.quintic_at(six, 0.5, three.copy())
-    numbers = np.arange(1.0, 13.0)
-    walking.capture_end(
-        three, three, np.zeros(2), three, three, numbers[:6].copy(), 0.0, 0.1, numbers, 1.0,
-        np.zeros((2, 2)),
-    )  # fmt: skip
-    walking.swing(np.zeros((3, 3)), three, 0.1, 1e-3, numbers[:4].copy(), 0.0, 0.1)
+    two, table, body = np.zeros((2, 3)), np.zeros((6, 2, 4)), (tuple(tree), terms, tuple(mounts))
+    step = walking.StepNow(old=three, new=three, height=six, offset=0.0, phase=0.1)
+    gait = tuple(1.0 for _ in walking.Gait._fields)
+    walking.capture_end(three, three, six[:2], tuple(step), gait, 1.0, np.zeros((2, 2)))
+    plan = tuple(1.0 for _ in walking.SwingPlan._fields)
+    walking.swing(np.zeros((3, 3)), three, 0.1, 1e-3, plan, 0.0, 0.1)
     walking_state.foresee(
-        tuple(tree), terms, tuple(mounts), q, v, np.zeros((6, 2)), 0, 0, np.zeros((2, 3)), six,
-        np.zeros((6, 2, 4)), (0.0, 1e-3, 0.0, 0.0), 1, (np.zeros(4), np.zeros((4, 6))), 0,
-        six.copy(),
+        body, (0, 0, two), (six, table), (0.0, 1e-3, 1, 0.0, 0.0),
+        (np.zeros(4), np.zeros((4, 6)), 0), q, v, np.zeros((6, 2)), six.copy(),
     )  # fmt: skip
-    walking_law.law(
-        terms, tuple(mounts), v, v, False, six, np.zeros((3, 3)), 0.1, (0.05, 0.1), 0,
-        np.zeros(9), six.copy(), six.copy(),
+    wish = walking_law.Reference(
+        height=six, height_time=0.1, swing=np.zeros((3, 3)), phase=0.1, transfer_time=0.05,
+        stance=0, still=False,
     )  # fmt: skip
-    walking_law.carry(six, six, six.copy(), six, six, six, six, np.zeros(4), six.copy())
+    gains = tuple(1.0 for _ in walking_law.Gains._fields)
+    walking_law.law(body[1:], v, v, tuple(wish), gains, six.copy(), six.copy())
+    walking_law.carry(six, six, six.copy(), six, six, six, six, gains[:4], six.copy())

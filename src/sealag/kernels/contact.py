@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.kernels._jit import entry, inner
 from sealag.kernels import friction
+from sealag.kernels._jit import entry, inner
 from sealag.kernels.dynamics import Frames, Mounts, Terms, Tree, frame_terms, rigid_body_terms
 from sealag.kernels.friction import Equations, Surfaces
 from sealag.kernels.ledger import DISTURBANCE, HOLDING, SLIDING, TORSION
@@ -230,7 +230,7 @@ def _write_powers(contacts, at, work):
 
 @inner
 def _prepare(plant, at, work):
-    """Write everything at an instant that its contact forces follow from; False if M is singular."""
+    """Write what the contact forces of an instant follow from; False if M is singular."""
     rigid_body_terms(plant.tree, at.q, at.v, work.terms)
     frame_terms(work.terms, plant.mounts, work.frames)
     _place_points(plant.contacts, at, work)
@@ -260,21 +260,14 @@ def accelerate(plant, at, work):
     return solved
 
 
-@entry
-def evaluate(raw_plant, raw_terms, raw_now):
-    """Evaluate dynamics and contact forces at an instant; False if there is no solution."""
-    plant = plant_of(raw_plant)
-    return accelerate(plant, Instant(*raw_now), allocate_work(plant, Terms(*raw_terms)))
-
-
-@entry
-def resolve(raw_plant, raw_terms, raw_now, touching, impact, impulse):
+@inner
+def resolve(plant, now, work, touching, impact, impulse):
     """Find which touching points stay closed, by an impact or under the forces of an instant.
 
     Args:
-        raw_plant: the plant; closed and yielding of its contacts are changed.
-        raw_terms: scratch.
-        raw_now: the instant; an impact changes its velocity.
+        plant: the plant; closed and yielding of its contacts are changed.
+        now: the instant; an impact changes its velocity.
+        work: scratch.
         touching: (P,) which points may be closed.
         impact: whether the points' velocities end in a plastic impact, else forces are sought.
         impulse: (P, 3) of the impact, Ns, written.
@@ -282,34 +275,30 @@ def resolve(raw_plant, raw_terms, raw_now, touching, impact, impulse):
     Returns:
         As `friction.settle`, and the energy that an impact takes, J.
     """
-    plant, now = plant_of(raw_plant), Instant(*raw_now)
-    work, contacts = allocate_work(plant, Terms(*raw_terms)), plant.contacts
-    eq, surfaces, tolerance = work.equations, surfaces_of(contacts), 1e-9 * contacts.weight
+    contacts, eq = plant.contacts, work.equations
+    surfaces, tolerance = surfaces_of(contacts), 1e-9 * contacts.weight
     if not _prepare(plant, now, work):
         return friction.UNSOLVABLE, 0.0
     project(eq.L, work.J, contacts.C, touching, eq.rows)
-    x = np.zeros(now.v.size)
+    x, yielding, force = np.zeros(now.v.size), contacts.yielding, now.force.copy()
+    if impact:
+        eq.target[:], eq.spin[:], force[:] = 0.0, 0.0, 0.0
+        yielding = np.zeros(touching.size)
+        for c in range(now.v.size):
+            eq.free[c] = 0.0
+            for k in range(c, now.v.size):
+                eq.free[c] += eq.L[k, c] * now.v[k]
+    status = friction.settle(eq, surfaces, touching, contacts.closed, yielding, tolerance, x, force)
     if not impact:
-        status = friction.settle(
-            eq, surfaces, touching, contacts.closed, contacts.yielding, tolerance, x,
-            now.force.copy(),
-        )  # fmt: skip
         return status, 0.0
-    eq.target[:], eq.spin[:], impulse[:] = 0.0, 0.0, 0.0
-    for c in range(now.v.size):
-        eq.free[c] = 0.0
-        for k in range(c, now.v.size):
-            eq.free[c] += eq.L[k, c] * now.v[k]
-    status = friction.settle(
-        eq, surfaces, touching, contacts.closed, np.zeros(touching.size), tolerance, x, impulse
-    )
+    copy(force, impulse)
     lost = 0.0
     for i in range(touching.size):
         mean = (0.0, 0.0, 0.0)
         for c in range(now.v.size):
             half, J = 0.5 * (now.v[c] + x[c]), work.J[i]
             mean = add(mean, scale(half, (J[0, c], J[1, c], J[2, c])))
-        lost -= dot(rotate(rotation(contacts.C, i), mean), vector(impulse, i))
+        lost -= dot(rotate(rotation(contacts.C, i), mean), vector(force, i))
     copy(x, now.v)
     return status, lost
 
@@ -341,37 +330,40 @@ def measure_gaps(contacts, at):
         at.gap[i] = height - contacts.floor[i]
 
 
-@inner
-def smallest_margin(contacts, at):
+@entry
+def smallest_margin(C, closed, weight, force, gap, velocity):
     """Return the smallest margin and its point: how far it is from ending its condition.
 
     Open: the gap (m), inf if it widens. Closed: the normal force in body weights.
+
+    Args:
+        C: (P, 3, 3) contact frames.
+        closed: (P,) whether each point is closed.
+        weight: of the robot, N.
+        force: (P, 3) in the contact frames, N.
+        gap: (P,) m.
+        velocity: (T, 3) m/s.
     """
     smallest, point = np.inf, -1
-    for i in range(contacts.closed.size):
-        if contacts.closed[i]:
-            margin = at.force[i, 2] / contacts.weight
+    for i in range(closed.size):
+        if closed[i]:
+            margin = force[i, 2] / weight
         else:
-            _, _, normal = rotation(contacts.C, i)
-            margin = at.gap[i] if dot(normal, vector(at.velocity, i)) < 0.0 else np.inf
+            _, _, normal = rotation(C, i)
+            margin = gap[i] if dot(normal, vector(velocity, i)) < 0.0 else np.inf
         if point < 0 or not margin >= smallest:
             smallest, point = margin, i
     return smallest, point
 
 
-@entry
-def margin(raw_contacts, raw_now):
-    """Return the smallest margin of an instant and its point, see `smallest_margin`."""
-    return smallest_margin(Contacts(*raw_contacts), Instant(*raw_now))
-
-
 @inner
-def write_measurement(at, contacts, t, row):
+def write_measurement(at, closed, foot, t, row):
     """Write what the sensors measure at an instant.
 
     Args:
         at: the instant, evaluated.
-        contacts: what is closed.
+        closed: (P,) whether each point is closed.
+        foot: (≥ P,) number of its foot.
         t: the time that the measurement says, s.
         row: of a `sealag.whole_body.Measurement`: time, q, v, theta, theta_dot, tau_sea and one
             flag for each foot; written.
@@ -381,12 +373,12 @@ def write_measurement(at, contacts, t, row):
         copy(part, row[place : place + part.size])
         place += part.size
     row[place:] = 0.0
-    for i in range(contacts.closed.size):
-        if contacts.closed[i]:
-            row[place + contacts.frame[i]] = 1.0
+    for i in range(closed.size):
+        if closed[i]:
+            row[place + foot[i]] = 1.0
 
 
 @entry
-def sense(raw_contacts, raw_now, t, row):
+def sense(raw_now, closed, foot, t, row):
     """Write what the sensors measure at an instant, see `write_measurement`."""
-    write_measurement(Instant(*raw_now), Contacts(*raw_contacts), t, row)
+    write_measurement(Instant(*raw_now), closed, foot, t, row)

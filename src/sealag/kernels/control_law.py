@@ -29,8 +29,8 @@ OF_FRAME, OF_MASS, OF_JOINT = 0, 1, 2  # what a task row measures
 MEASURED, STATIC, TANK = range(3)  # the law is taken at given angles, at q̄(θ), at x̂
 EXISTS, SINGULAR_MASS, NO_STATIC_STATE = range(3)  # how `tick` ends
 _PIVOT = 1e-12
-"""Of a spring: pivots below count as none. Rounding leaves 1e-15; a law within 1e-12 of its springs'
-stiffness has no use."""
+"""Of a spring: pivots below count as none. Ten times smaller meets rounding where a law is as stiff
+as its springs; ten times larger refuses no law of use."""
 
 
 class Tasks(NamedTuple):
@@ -222,12 +222,6 @@ def _write_torque(control, out):
     space, gains = control.space, control.gains
     gravity = space.gravity if gains.fed_back else gains.planned_gravity
     task_torque(space.J_star, space.stiffness, control.at.error, gravity, out)
-
-
-@entry
-def torque(raw_control, out):
-    """Write the torque (n,) of the errors and matrices that stand here now."""
-    _write_torque(control_of(raw_control), out)
 
 
 @inner

@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 from sealag.typing import Array
 
-PORT, SHAFT, MOTOR_WORK, COMMAND, DAMPING, VISCOUS, COULOMB, SPRING_DAMPING, JOINT_DAMPING = range(9)
+PORT, SHAFT, MOTOR_WORK, COMMAND, DAMPING, VISCOUS, COULOMB, SPRING_DAMPING, JOINT_DAMPING = range(
+    9
+)
 JOINT_FLOWS = (
     "port",  # ∫ tau_sea q̇: springs to links
     "shaft",  # ∫ tau_sea θ̇: motors to springs

@@ -7,8 +7,8 @@ import numpy as np
 from sealag.kernels._jit import inner
 
 _ROUNDING = 1e-13
-"""Of the trace: what a Cholesky factorisation leaves. Ten times smaller takes rounding for rank; ten
-times larger drops directions that the rank tolerance of tasks, 1e-9, is to decide about."""
+"""Of the trace: what a Cholesky factorisation leaves. Ten times smaller takes rounding for rank;
+ten times larger drops directions that the rank tolerance of tasks, 1e-9, is to decide about."""
 _WORST_CONDITION = 1e4
 """Up to which A⁺ through G⁻² loses no more than six digits; ten times more loses eight."""
 
@@ -225,7 +225,6 @@ def _factor(A, L, left):
     return n, trace
 
 
-
 @inner
 def invert_low_rank(A, threshold, out, scratch, values):
     """out = A⁺ of a symmetric positive semidefinite A (n, n), if that is safe without eigenvalues.
@@ -268,13 +267,11 @@ def invert_low_rank(A, threshold, out, scratch, values):
     return r
 
 
-
 @inner
 def pseudo_inverse(A, threshold, out, scratch, values):
     """out = A⁺; eigenvalues only where `invert_low_rank` gives no answer. A is overwritten."""
     if invert_low_rank(A, threshold, out, scratch, values) < 0:
         pseudo_inverse_psd(A, threshold, out, scratch[0], values, scratch[1])
-
 
 
 @inner
@@ -308,7 +305,6 @@ def least_squares(A, r, damping, x):
         return
     forward_solve(L, x)
     backward_solve(L, x)
-
 
 
 @inner

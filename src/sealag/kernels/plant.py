@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.kernels._jit import entry, inner
 from sealag.kernels import motor, spatial
+from sealag.kernels._jit import entry, inner
 from sealag.kernels.contact import (
     Instant,
     accelerate,
@@ -18,10 +18,12 @@ from sealag.kernels.contact import (
     ground_height,
     measure_gaps,
     plant_of,
+    resolve,
     smallest_margin,
     write_measurement,
 )
 from sealag.kernels.dynamics import KINETIC, POTENTIAL, Terms
+from sealag.kernels.friction import SETTLED, UNSOLVABLE
 from sealag.kernels.ledger import (
     GRAVITY_STORE,
     IMPACT,
@@ -42,6 +44,7 @@ LOAD, SAMPLE, TICK, TAKE = range(4)  # kinds of events, in their order at one in
 WATCH, EVENTS, CLOSE, MOVE, INSIDE = range(5)
 """What comes next in a run: at a step's beginning watch, let events happen, close the instant
 (torque feedback and log), move; inside a step only events."""
+EVALUATE, SETTLE, STRIKE, STEP = range(4)  # what `act` does
 END, FALLEN, EVENT, STATE, BLOCKED = range(5)  # why `glide` returns
 
 
@@ -140,7 +143,9 @@ def _predict_motors(plant, now, held, step, memory):
     n, motors = now.theta.size, plant.motors
     first_q, first_v = now.q.size - n, now.v.size - n
     for j in range(n):
-        link = motor.Link(now.q[first_q + j], now.v[first_v + j], now.acceleration[first_v + j], 0.0)
+        link = motor.Link(
+            now.q[first_q + j], now.v[first_v + j], now.acceleration[first_v + j], 0.0
+        )
         rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
         half, whole = motor.predict(motors, j, held, rotor, link, step, memory.series)
         memory.angle[0, j], memory.speed[0, j] = half.angle, half.speed
@@ -247,49 +252,39 @@ def _copy(source, target):
 
 
 @entry
-def advance(raw_plant, raw_terms, raw_instants, raw_held, step, raw_gained):
-    """Try a step in the present contact modes.
+def act(raw_plant, raw_terms, raw_instants, what, raw_held, step, raw_gained, touching, impulse):
+    """Do one thing with a plant: all that Python asks of it shares one compilation.
 
     Args:
         raw_plant: the plant.
         raw_terms: scratch.
-        raw_instants: the step's beginning, evaluated; and its end, written.
-        raw_held: what the drives hold.
-        step: s.
-        raw_gained: `Ledger` of the step's works, written.
+        raw_instants: the present instant, and the end of a step.
+        what: EVALUATE the present instant's dynamics and contact forces; SETTLE which touching
+            points are closed under its forces, or STRIKE them on the ground; try a STEP.
+        raw_held: what the drives hold over a step.
+        step: its length, s.
+        raw_gained: `Ledger` of a step's works, written.
+        touching: (P,) points that may be closed.
+        impulse: (P, 3) of an impact, Ns, written.
 
     Returns:
-        Whether every instant has a solution.
+        How contacts have settled, as `friction.settle`, and what an impact took, J.
     """
     plant, work, now, following, gained = _unpack(raw_plant, raw_terms, raw_instants, raw_gained)
-    memory = _allocate_step(now.v.size, gained)
-    return _step(plant, work, now, Held(*raw_held), step, memory, following)
+    if what in (SETTLE, STRIKE):
+        return resolve(plant, now, work, touching, what == STRIKE, impulse)
+    if what == EVALUATE:
+        solved = accelerate(plant, now, work)
+    else:
+        memory = _allocate_step(now.v.size, gained)
+        solved = _step(plant, work, now, Held(*raw_held), step, memory, following)
+    return SETTLED if solved else UNSOLVABLE, 0.0
 
 
 @entry
-def accept(raw_plant, raw_instants, raw_gained, raw_ledger):
-    """Take the end of the step that was tried for the present instant, and book the step."""
-    now, following = raw_instants
-    _accept(
-        plant_of(raw_plant).motors, Instant(*following), Instant(*now), Ledger(*raw_gained),
-        Ledger(*raw_ledger),
-    )  # fmt: skip
-
-
-@entry
-def begin_books(raw_plant, raw_now, raw_ledger):
-    """Open empty books at an instant."""
-    ledger = Ledger(*raw_ledger)
-    ledger.joint[:], ledger.scalar[:], ledger.moved[:] = 0.0, 0.0, 0.0
-    _stores(plant_of(raw_plant).motors, Instant(*raw_now), ledger.stores)
-
-
-@entry
-def book_impact(raw_plant, raw_now, lost, raw_ledger):
-    """Book what an impact took, J, and the stores after it."""
-    ledger = Ledger(*raw_ledger)
-    ledger.scalar[IMPACT] += lost
-    _update_stores(plant_of(raw_plant).motors, Instant(*raw_now), ledger)
+def update_stores(raw_motors, raw_now, raw_ledger):
+    """Write the stores of an instant, and add how much has moved between them."""
+    _update_stores(motor.Motors(*raw_motors), Instant(*raw_now), Ledger(*raw_ledger))
 
 
 @inner
@@ -353,7 +348,8 @@ def _happen(plant, channels, now, event):
     tick = channels.tick[event]
     if channels.kind[event] == SAMPLE:
         row = channels.samples[tick % channels.samples.shape[0]]
-        write_measurement(now, plant.contacts, channels.due[event], row)
+        contacts = plant.contacts
+        write_measurement(now, contacts.closed, contacts.frame, channels.due[event], row)
     elif channels.kind[event] == TAKE:
         copy(channels.commands[tick % channels.commands.shape[0]], channels.acting)
         channels.acting_tick[0] = tick
@@ -371,7 +367,10 @@ def _slide(plant, work, now, held, step, memory, following):
         following.energy[KINETIC]
     ):
         measure_gaps(contacts, following)
-        smallest, _ = smallest_margin(contacts, following)
+        smallest, _ = smallest_margin(
+            contacts.C, contacts.closed, contacts.weight, following.force, following.gap,
+            following.velocity,
+        )  # fmt: skip
         if smallest >= -MARGIN:
             return True
     copy(before, contacts.yielding)
@@ -404,7 +403,7 @@ def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, curs
     Returns:
         END; FALLEN if `Limits` are left; EVENT if an event needs Python, whose part it is to count
         it; STATE if the controller must state its storage for the log; BLOCKED if a step needs
-        Python. And the raw `Cursor`, that of BLOCKED behind the step.
+        Python. The present instant, s. And the raw `Cursor`, that of BLOCKED behind the step.
     """
     plant, work, now, following, ledger = _unpack(raw_plant, raw_terms, raw_instants, raw_ledger)
     raw_channels, raw_periods, raw_limits, instant = raw_run
@@ -420,24 +419,24 @@ def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, curs
         if part == WATCH:
             part = EVENTS
             if step % periods.watch == 0 and (not profiled or _lost(plant, now, limits)):
-                return FALLEN, (time, step, event, part)
+                return FALLEN, time, (time, step, event, part)
         if part in (EVENTS, INSIDE):
             while event < channels.due.size and channels.due[event] <= time + same:
                 if not _happen(plant, channels, now, event):
-                    return EVENT, (time, step, event, part)
+                    return EVENT, time, (time, step, event, part)
                 event += 1
             part = CLOSE if part == EVENTS else MOVE
         if part == CLOSE:
             logged = step % periods.log == 0 or step == periods.steps
             if logged and said != np.inf and said != time:
-                return STATE, (time, step, event, part)
+                return STATE, time, (time, step, event, part)
             if channels.torque_known.size > 0 and step % periods.torque == 0:
                 _feed_torque(channels, periods, step // periods.torque, now)
             if logged:
                 row = (step + periods.log - 1) // periods.log
                 _record(plant, channels, now, time, ledger, log, row)
             if step == periods.steps:
-                return END, (time, step, event, part)
+                return END, time, (time, step, event, part)
             part = MOVE
         begin, end = time, (step + 1) * periods.step
         time, part = end, WATCH
@@ -449,7 +448,7 @@ def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, curs
         if abs(span - periods.step) <= same:
             span = periods.step
         if not (profiled and _slide(plant, work, now, held, span, memory, following)):
-            return BLOCKED, (time, step, event, part)
+            return BLOCKED, begin, (time, step, event, part)
         _accept(plant.motors, following, now, gained, ledger)
 
 

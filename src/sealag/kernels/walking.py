@@ -1,8 +1,11 @@
 """Walking kernels: quintic references, the pendulum under a planned height, foothold and swing."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sealag.kernels._jit import entry, inner
+from sealag.typing import Array
 
 GRAVITY = 9.81
 
@@ -77,45 +80,78 @@ def pendulum(x, v, begin, end, transfer, old, new, height, offset, steps):
             v[k] += h * a
 
 
+class Gait(NamedTuple):
+    """The periodic gait, and what the legs reach."""
+
+    step_time: float  # s
+    transfer_time: float  # of the weight, from phase 0, s
+    rate: float  # ω of the pendulum, 1/s
+    growth: float  # e = exp(ω T)
+    carried: float  # κ, the part of it that the old foot still carries
+    end_forward: float  # wanted capture point at the end of a step, from the foot stood on, m
+    end_outward: float  # m
+    nearest: float  # bounds of the foothold from the foot stood on: forward, m
+    farthest: float
+    narrowest: float  # and outward, m
+    widest: float
+    side: float  # sign of y from the foot stood on outward
+
+
+class StepNow(NamedTuple):
+    """The step under way."""
+
+    old: Array  # (3,) foot left, m
+    new: Array  # (3,) foot stood on, m
+    height: Array  # (6,) quintic of the height over the world's zero
+    offset: float  # phase at which the quintic's time is 0, s
+    phase: float  # now, s
+
+
+class SwingPlan(NamedTuple):
+    """How the swing foot moves."""
+
+    step_time: float  # s
+    transfer_time: float  # s
+    still: float  # share of the swing after which the foot no longer moves horizontally
+    search: float  # speed at which a late foot is lowered, m/s
+
+
 @entry
-def capture_end(com, speed, momentum, old, new, height, offset, phase, gait, share, memory):
+def capture_end(com, speed, momentum, raw_step, raw_gait, share, memory):
     """Average where the present step ends and write the foothold it asks for.
 
     Args:
         com: (3,) m.
         speed: (3,) of the CoM, m/s.
         momentum: (2,) what the angular momentum adds to the horizontal speed, m/s.
-        old: (3,) foot left.
-        new: (3,) foot stood on.
-        height: (6,) quintic of the height over the world's zero.
-        offset: phase at which the quintic's time is 0, s.
-        phase: now, s.
-        gait: step time, weight transfer (s); ω, e and κ of the periodic gait; wanted forward and
-            outward capture point (m); bounds of the forward (2) and outward (2) foothold (m); sign
-            of outward.
+        raw_step: the step.
+        raw_gait: the gait.
         share: of the new end in the average.
         memory: (2, 2) averaged position and speed at the end, moved.
 
     Returns:
         x and y of the foothold, m.
     """
-    T, transfer, rate, growth, carried = gait[0], gait[1], gait[2], gait[3], gait[4]
-    side = gait[11]
+    step, gait = StepNow(*raw_step), Gait(*raw_gait)
+    new, side = step.new, gait.side
     x, v = com[:2].copy(), speed[:2] + momentum
-    pendulum(x, v, phase, T, transfer, old, new, height, offset, 16)
+    pendulum(
+        x, v, step.phase, gait.step_time, gait.transfer_time, step.old, new, step.height,
+        step.offset, 16,
+    )  # fmt: skip
     for k in range(2):
         memory[0, k] += share * (x[k] - memory[0, k])
         memory[1, k] += share * (v[k] - memory[1, k])
-        capture = memory[0, k] + memory[1, k] / rate - new[k]
-        wanted = gait[5] if k == 0 else -side * gait[6]
-        x[k] = (growth * capture - wanted) / (growth - carried)
-    forward = min(max(x[0], gait[7]), gait[8])
-    outward = min(max(side * x[1], gait[9]), gait[10])
+        capture = memory[0, k] + memory[1, k] / gait.rate - new[k]
+        wanted = gait.end_forward if k == 0 else -side * gait.end_outward
+        x[k] = (gait.growth * capture - wanted) / (gait.growth - gait.carried)
+    forward = min(max(x[0], gait.nearest), gait.farthest)
+    outward = min(max(side * x[1], gait.narrowest), gait.widest)
     return new[0] + forward, new[1] + side * outward
 
 
 @entry
-def swing(now, target, phase, period, gait, lift, bump):
+def swing(now, target, phase, period, raw_plan, lift, bump):
     """Move the swing foot's reference by one period; late, lower it until it meets the ground.
 
     Args:
@@ -123,14 +159,14 @@ def swing(now, target, phase, period, gait, lift, bump):
         target: (3,) where it shall land, m.
         phase: of the step, s.
         period: s.
-        gait: step time, weight transfer (s), share of the swing after which the foot no longer
-            moves horizontally, and speed at which a late foot is lowered (m/s).
+        raw_plan: how the foot moves.
         lift: height at which it left the ground, m.
         bump: height of the middle of its path over the straight line, m.
     """
-    T, transfer = gait[0], gait[1]
+    plan = SwingPlan(*raw_plan)
+    T, transfer = plan.step_time, plan.transfer_time
     duration = T - transfer
-    left = transfer + gait[2] * duration - phase
+    left = transfer + plan.still * duration - phase
     c, end = np.empty(6), np.zeros(3)
     for i in range(2):
         if left > 0.015:
@@ -142,7 +178,7 @@ def swing(now, target, phase, period, gait, lift, bump):
     u = min(max((phase - transfer) / duration, 0.0), 1.0)
     w, rise = 1.0 - u, target[2] - lift
     if u >= 1.0:
-        now[0, 2], now[1, 2], now[2, 2] = target[2] - gait[3] * (phase - T), -gait[3], 0.0
+        now[0, 2], now[1, 2], now[2, 2] = target[2] - plan.search * (phase - T), -plan.search, 0.0
         return
     now[0, 2] = lift + rise * u**3 * (10 - 15 * u + 6 * u * u) + 64 * bump * (u * w) ** 3
     rate = 30 * rise * (u * w) ** 2 + 192 * bump * (u * w) ** 2 * (w - u)

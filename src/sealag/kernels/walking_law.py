@@ -4,6 +4,7 @@ The robot's terms are those of one instant; feet are point contacts (3 rows each
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from sealag.kernels.linalg import (
     multiply_transposed,
 )
 from sealag.kernels.walking import quintic_at
+from sealag.typing import Array
 
 
 @inner
@@ -103,73 +105,105 @@ def _posture(R, v, heading):
     return math.atan2(R[2, 1], R[2, 2]), pitch, turn
 
 
+class Reference(NamedTuple):
+    """What is wanted now."""
+
+    height: Array  # (6,) quintic of the CoM's height
+    height_time: float  # its time, s
+    swing: Array  # (3, 3) position, velocity, acceleration of the swing foot's reference
+    phase: float  # of the step, s
+    transfer_time: float  # duration of the weight transfer from phase 0, s
+    stance: int  # foot stood on
+    still: bool  # whether J̇ v counts as zero
+
+
+class Gains(NamedTuple):
+    """Gains of the walking law."""
+
+    height_stiffness: float  # 1/s²
+    posture_stiffness: float  # 1/s²
+    swing_stiffness: float  # 1/s²
+    height_damping: float  # 1/s
+    posture_damping: float  # 1/s
+    swing_damping: float  # 1/s
+    planned: float  # share of the planned acceleration
+    position_rate: float  # at which swing errors enter the planned rates, 1/s
+    damping: float  # of the solutions, see `linalg.least_squares`
+
+
+class Lead(NamedTuple):
+    """Means by which springs and motors carry the task torque."""
+
+    keep: float  # share of the average that is kept from tick to tick
+    time: float  # time constant of the lead, s; 0 without
+    forward: float  # 1.0 if velocities are fed forward
+    feedback: float  # gain of the torque feedback
+
+
 @entry
-def law(raw_terms, raw_mounts, v, h, still, height, swing, phase, clock, stance, gains, tau, rates):
+def law(raw_body, v, h, raw_reference, raw_gains, tau, rates):
     """Write the task torques, and the joint rates of the planned motion.
 
     Six tasks: CoM height, roll, pitch, swing foot. During the weight transfer the torques of both
     single supports are blended.
 
     Args:
-        raw_terms: of the robot.
-        raw_mounts: of both feet.
+        raw_body: `Terms` and the feet's `Mounts`.
         v: (12,) velocity.
         h: (12,) Coriolis and gravity torques.
-        still: whether J̇ v counts as zero.
-        height: (6,) quintic of the CoM height.
-        swing: (3, 3) position, velocity, acceleration of the swing foot's reference.
-        phase: of the step, s.
-        clock: weight transfer and time of the height's quintic, s.
-        stance: foot stood on.
-        gains: stiffness (3) of height, posture and swing foot, 1/s²; damping (3), 1/s; share of the
-            planned acceleration; rate at which swing errors enter the planned rates, 1/s; damping
-            of the solutions.
+        raw_reference: what is wanted.
+        raw_gains: gains.
         tau: (6,) written, Nm.
         rates: (6,) written, rad/s.
 
     Returns:
         Whether the torques are finite.
     """
+    raw_terms, raw_mounts = raw_body
+    wish, gains = Reference(*raw_reference), Gains(*raw_gains)
+    stance, swing = wish.stance, wish.swing
     terms, nv = Terms(*raw_terms), v.size
     frames = Frames(np.empty((2, 6, nv)), np.empty((2, 3, 3)), np.empty((2, 3)), np.zeros((2, 6)))
     frame_terms(terms, Mounts(*raw_mounts), frames)
     J, p, bias = frames.J, frames.p, frames.drift
-    bend = 0.0 if still else terms.com_drift[2]
-    if still:
+    bend = 0.0 if wish.still else terms.com_drift[2]
+    if wish.still:
         bias[:] = 0.0
     heading, z, other = np.empty((2, 3)), np.empty(3), 1 - stance
     roll, pitch, turn = _posture(terms.rotation[1], v, heading)
-    quintic_at(height, clock[1], z)
+    quintic_at(wish.height, wish.height_time, z)
     wanted, velocity = np.zeros(6), np.zeros(12)
-    wanted[0] = gains[6] * z[2] + gains[0] * (z[0] - terms.com[2])
-    wanted[0] += gains[3] * (z[1] - terms.com_velocity[2])
+    wanted[0] = gains.planned * z[2] + gains.height_stiffness * (z[0] - terms.com[2])
+    wanted[0] += gains.height_damping * (z[1] - terms.com_velocity[2])
     for i in range(2):
-        wanted[1 + i] = -gains[1] * (pitch if i else roll)
-        wanted[1 + i] -= gains[4] * (heading[i, 0] * turn[0] + heading[i, 1] * turn[1])
-    transfer = phase < clock[0]
+        wanted[1 + i] = -gains.posture_stiffness * (pitch if i else roll)
+        rate = heading[i, 0] * turn[0] + heading[i, 1] * turn[1]
+        wanted[1 + i] -= gains.posture_damping * rate
+    transfer = wish.phase < wish.transfer_time
     if not transfer:
         for a in range(3):
             error, speed = swing[0, a] - p[other, a], swing[1, a]
             for c in range(nv):
                 speed -= J[other, a, c] * v[c]
-            wanted[3 + a] = gains[6] * swing[2, a] + gains[2] * error + gains[5] * speed
-            velocity[6 + a] = swing[1, a] + gains[7] * error
+            wanted[3 + a] = gains.planned * swing[2, a] + gains.swing_stiffness * error
+            wanted[3 + a] += gains.swing_damping * speed
+            velocity[6 + a] = swing[1, a] + gains.position_rate * error
     M_inverse, factor = np.empty((nv, nv)), np.empty((nv, nv))
     if not invert_spd(terms.M, M_inverse, factor):
         return False
     rows = np.zeros((12, nv))
     _rows(J, terms.rotation[1], heading, terms.com_jacobian, stance, rows)
-    _support(M_inverse, h, J, bias, rows[3:9], bend, stance, wanted, gains[8], tau)
+    _support(M_inverse, h, J, bias, rows[3:9], bend, stance, wanted, gains.damping, tau)
     if transfer:
-        back, share = np.empty(6), phase / clock[0]
+        back, share = np.empty(6), wish.phase / wish.transfer_time
         turned = rows[3:9].copy()
         turned[3:] = J[stance, :3]
-        _support(M_inverse, h, J, bias, turned, bend, other, wanted, gains[8], back)
+        _support(M_inverse, h, J, bias, turned, bend, other, wanted, gains.damping, back)
         for j in range(6):
             tau[j] = share * tau[j] + (1.0 - share) * back[j]
     velocity[3], velocity[9:11], velocity[11] = z[1], terms.com_velocity[:2], turn[2]
     solution = np.empty(12)
-    least_squares(rows, velocity, gains[8], solution)
+    least_squares(rows, velocity, gains.damping, solution)
     rates[:] = solution[6:]
     return math.isfinite(tau.sum())
 
@@ -195,7 +229,7 @@ def _support(M_inverse, h, J, bias, rows, bend, stance, wanted, damping, tau):
 
 
 @entry
-def carry(tau, limit, smooth, rates, tau_sea, D, D_by_K, gains, command):
+def carry(tau, limit, smooth, rates, tau_sea, D, D_by_K, raw_lead, command):
     """Write the command that makes springs and motors carry the task torque within its limits.
 
     Args:
@@ -206,14 +240,14 @@ def carry(tau, limit, smooth, rates, tau_sea, D, D_by_K, gains, command):
         tau_sea: (n,) predicted spring torques, Nm.
         D: (n,) embedded damping.
         D_by_K: (n,) D_θ / K, s.
-        gains: share of the average that is kept, and time constant (s, 0 without lead); whether
-            velocities are fed forward; gain of the torque feedback.
+        raw_lead: by which means.
         command: (n,) written, Nm.
     """
+    lead = Lead(*raw_lead)
     for j in range(tau.size):
         tau[j] = min(max(tau[j], -limit[j]), limit[j])
         command[j] = tau[j]
-        if gains[1] > 0.0:
-            smooth[j] = tau[j] + gains[0] * (smooth[j] - tau[j])
-            command[j] = smooth[j] + D_by_K[j] * ((tau[j] - smooth[j]) / gains[1])
-        command[j] += gains[2] * D[j] * rates[j] + gains[3] * (tau[j] - tau_sea[j])
+        if lead.time > 0.0:
+            smooth[j] = tau[j] + lead.keep * (smooth[j] - tau[j])
+            command[j] = smooth[j] + D_by_K[j] * ((tau[j] - smooth[j]) / lead.time)
+        command[j] += lead.forward * D[j] * rates[j] + lead.feedback * (tau[j] - tau_sea[j])

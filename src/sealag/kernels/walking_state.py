@@ -3,6 +3,8 @@
 The robot's terms are those of one instant; feet are point contacts (3 rows each), 0 left, 1 right.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sealag.kernels._jit import entry, inner
@@ -10,61 +12,95 @@ from sealag.kernels.dynamics import Frames, Mounts, Terms, Tree, frame_terms, ri
 from sealag.kernels.linalg import invert_spd
 from sealag.kernels.spatial import integrate
 from sealag.kernels.walking_law import constrain
+from sealag.typing import Array
+
+
+class Links(NamedTuple):
+    """Terms of the links at the measured instant; feet in the order left behind, stood on."""
+
+    M: Array  # (nv, nv) mass matrix
+    h: Array  # (nv,) Coriolis and gravity torques
+    J: Array  # (2, 3, nv) of the feet
+    drift: Array  # (2, 3) J̇ v
+
+
+class Support(NamedTuple):
+    """Where the feet stand."""
+
+    stance: int  # foot stood on
+    foot: int  # which one the odometry stands on, or −1
+    anchor: Array  # (2, 3) where the feet stand, m
+
+
+class Springs(NamedTuple):
+    """Springs and motors."""
+
+    stiffness: Array  # (n,) Nm/rad
+    table: Array  # (n, 2, 4) exact motor step: of θ, θ̇, force and force rate
+
+
+class Timing(NamedTuple):
+    """From when to when the state is predicted."""
+
+    measured: float  # instant of the measurement, s
+    period: float  # s
+    ticks: int  # periods to predict; if negative, v is extrapolated as many periods
+    touchdown: float  # instant at which the new foot touches down, s
+    lift_off: float  # instant at which the old foot lifts off, s
+
+
+class Flight(NamedTuple):
+    """Ring of the commands that were sent."""
+
+    arrival: Array  # (k,) expected, s
+    command: Array  # (k, n) Nm
+    newest: int  # place of the newest
 
 
 @inner
-def predict(M, h, J, b, q_joint, v, motor, K, table, start, period, ticks, arrival, command,
-            newest, begin, end):  # fmt: skip
+def predict(links, q_joint, v, motor, springs, timing, flight):
     """Predict links, springs and motors under the commands still in flight.
 
     The links' terms are frozen at the measured instant; the motors move exactly between ticks
     with the link angle linear over a tick.
 
     Args:
-        M: (nv, nv) mass matrix.
-        h: (nv,) Coriolis and gravity torques.
-        J: (2, 3, nv) rows of the foot that is left and of the foot stood on.
-        b: (2, 3) their J̇ v.
+        links: their terms.
         q_joint: (n,) link-side joint positions.
         v: (nv,) velocity; moved.
         motor: (n, 2) motor angles and speeds; moved.
-        K: (n,) spring stiffness.
-        table: (n, 2, 4) exact motor step: of θ, θ̇, force and force rate.
-        start: instant of the measurement, s.
-        period: s.
-        ticks: number of periods to predict.
-        arrival: (k,) ring of the commands' expected arrivals, s.
-        command: (k, n) ring of the commands.
-        newest: place of the newest command in the ring.
-        begin: instant at which the new foot touches down, s.
-        end: instant at which the old foot lifts off, s.
+        springs: springs and motors.
+        timing: from when to when.
+        flight: the commands.
 
     Returns:
         (nv,) displacement in the tangent space of the measured configuration.
     """
+    K, table, period = springs.stiffness, springs.table, timing.period
     nv, n = v.size, K.size
     base = nv - n
     M_inverse, factor = np.empty((nv, nv)), np.empty((nv, nv))
     moved, before, a = np.zeros(nv), np.empty(n), np.empty(nv)
     a_0, P, P_t = np.empty(nv), np.empty((nv, n)), np.empty((n, nv))
-    if not invert_spd(M, M_inverse, factor):
+    if not invert_spd(links.M, M_inverse, factor):
         moved[:] = np.nan
         return moved
     mode = -1
-    for i in range(ticks):
-        t = start + (i + 0.5) * period
-        now = 0 if t < begin else (1 if t < end else 2)
+    for i in range(timing.ticks):
+        t = timing.measured + (i + 0.5) * period
+        now = 0 if t < timing.touchdown else (1 if t < timing.lift_off else 2)
         if now != mode:
             mode = now
             first, last = (1, 2) if mode == 2 else ((0, 1) if mode == 0 else (0, 2))
-            rows = J[first:last].copy().reshape(3 * (last - first), nv)
-            constrain(M_inverse, h, rows, b[first:last].copy().reshape(rows.shape[0]), a_0, P)
+            rows = links.J[first:last].copy().reshape(3 * (last - first), nv)
+            drift = links.drift[first:last].copy().reshape(rows.shape[0])
+            constrain(M_inverse, links.h, rows, drift, a_0, P)
             P_t[:] = P.T
-        k = newest
-        for _ in range(arrival.size):
-            if arrival[k] <= t:
+        k = flight.newest
+        for _ in range(flight.arrival.size):
+            if flight.arrival[k] <= t:
                 break
-            k = k - 1 if k > 0 else arrival.size - 1
+            k = k - 1 if k > 0 else flight.arrival.size - 1
         a[:] = a_0
         for j in range(n):
             before[j] = q_joint[j] + moved[base + j]
@@ -75,7 +111,7 @@ def predict(M, h, J, b, q_joint, v, motor, K, table, start, period, ticks, arriv
             v[c] += period * a[c]
             moved[c] += period * v[c]
         for j in range(n):
-            force, rate = command[k, j] + K[j] * before[j], K[j] * v[base + j]
+            force, rate = flight.command[k, j] + K[j] * before[j], K[j] * v[base + j]
             theta, speed = motor[j, 0], motor[j, 1]
             for r in range(2):
                 motor[j, r] = (
@@ -148,46 +184,45 @@ def stand(terms, mounts, q, v, h, foot, anchor, J, b):
 
 
 @entry
-def foresee(raw_tree, raw_terms, raw_mounts, q, v, motor, stance, foot, anchor, K, table, clock, ticks, ring,
-            newest, tau_sea):  # fmt: skip
+def foresee(
+    raw_body, raw_support, raw_springs, raw_timing, raw_flight, q, v, motor, tau_sea
+):  # fmt: skip
     """Estimate the measured state by the standing foot, and predict it; q, v and motor are moved.
 
     Args:
-        raw_tree: the robot.
-        raw_terms: its terms, evaluated at the end.
-        raw_mounts: of both feet.
+        raw_body: `Tree`, `Terms` and the feet's `Mounts`; the terms are evaluated at the end.
+        raw_support: where the feet stand.
+        raw_springs: springs and motors.
+        raw_timing: from when to when.
+        raw_flight: the commands.
         q: (13,) configuration.
         v: (12,) velocity.
         motor: (6, 2) angles and speeds.
-        stance: foot stood on.
-        foot: which one the odometry stands on, or −1.
-        anchor: (2, 3) where the feet stand, m.
-        K: (6,) spring stiffness.
-        table: (6, 2, 4) see `predict`.
-        clock: instant of the measurement, period, touchdown, lift-off; s.
-        ticks: number of periods to predict; if negative, v is extrapolated as many periods.
-        ring: arrivals (k,) and commands (k, 6), see `predict`.
-        newest: place of the newest command.
         tau_sea: (6,) spring torques then, written.
     """
+    raw_tree, raw_terms, raw_mounts = raw_body
     tree, terms, mounts = Tree(*raw_tree), Terms(*raw_terms), Mounts(*raw_mounts)
-    nv, n = v.size, K.size
-    base = nv - n
+    support, springs, timing = Support(*raw_support), Springs(*raw_springs), Timing(*raw_timing)
+    nv, n = v.size, springs.stiffness.size
+    base, stance = nv - n, support.stance
     J, b, h = np.empty((2, 6, nv)), np.empty((2, 3)), np.empty(nv)
     rigid_body_terms(tree, q, v, terms)
-    stand(terms, mounts, q, v, h, foot, anchor, J, b)
+    stand(terms, mounts, q, v, h, support.foot, support.anchor, J, b)
     moved = np.zeros(nv)
-    if ticks > 0:
-        rows, bias = np.empty((2, 3, nv)), np.empty((2, 3))
-        rows[0], rows[1] = J[1 - stance, :3], J[stance, :3]
-        bias[0], bias[1] = b[1 - stance], b[stance]
-        moved = predict(
-            terms.M, h, rows, bias, q[q.size - n :], v, motor, K, table, clock[0], clock[1],
-            ticks, ring[0], ring[1], newest, clock[2], clock[3],
-        )  # fmt: skip
-    elif ticks < 0:
-        moved[:] = -ticks * clock[1] * v
+    if timing.ticks > 0:
+        rows, drift = np.empty((2, 3, nv)), np.empty((2, 3))
+        for f, foot in enumerate((1 - stance, stance)):
+            for a in range(3):
+                drift[f, a] = b[foot, a]
+                for c in range(nv):
+                    rows[f, a, c] = J[foot, a, c]
+        links = Links(terms.M, h, rows, drift)
+        moved = predict(links, q[q.size - n :], v, motor, springs, timing, Flight(*raw_flight))
+    elif timing.ticks < 0:
+        for c in range(nv):
+            moved[c] = -timing.ticks * timing.period * v[c]
     for j in range(n):
-        tau_sea[j] = K[j] * (motor[j, 0] - q[q.size - n + j] - moved[base + j])
+        stretch = motor[j, 0] - q[q.size - n + j] - moved[base + j]
+        tau_sea[j] = springs.stiffness[j] * stretch
     integrate(q.copy(), moved, base, q)
     rigid_body_terms(tree, q, v, terms)

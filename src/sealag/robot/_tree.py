@@ -11,6 +11,7 @@ from sealag.robot._mimic import Coupling
 if TYPE_CHECKING:
     from sealag.kernels.dynamics import Mounts, Tree
 
+
 def tree_of(model: Any, coupling: Coupling) -> "Tree":
     """Return a model's bodies and joints.
 

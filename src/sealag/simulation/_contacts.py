@@ -119,7 +119,10 @@ class Surroundings:
 
     def margin(self, at: "Instant") -> tuple[float, int]:
         """Return the smallest margin (m, body weights) and its point; below 0 it must change."""
-        return self._kernel.margin(tuple(self.contacts), tuple(at))
+        contacts = self.contacts
+        return self._kernel.smallest_margin(
+            contacts.C, contacts.closed, contacts.weight, at.force, at.gap, at.velocity
+        )
 
     def touching(self, at: "Instant", *, tolerance: float = _NEAR) -> IntArray:
         """Return 1 for every point that is closed or could close now (P,)."""

@@ -9,7 +9,6 @@ from sealag.simulation._network import Clock, Network
 from sealag.typing import Array, IntArray
 
 
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ages:
     """How old the signals of a run became at most, just before something newer took their place.

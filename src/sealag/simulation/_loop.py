@@ -212,6 +212,7 @@ class _Loop:
         )
         self._channels = self._open(time[order], kind[order], tick[order])
         self._log = self._allocate(-(-steps // every) + 1)
+        self._raw = tuple(map(tuple, (self._channels, self._limits, self._log)))
 
     def _open(self, due: Array, kind: IntArray, tick: IntArray) -> "Channels":
         """Allocate what is on its way, as much as there ever is at once."""
@@ -246,8 +247,9 @@ class _Loop:
         robot, plant = self.robot, self.plant
         n, points, ledger = robot.n, plant.surroundings.count, plant.ledger
         shapes = {
-            "time": (), "tick": (), "q": (robot.nq,), "v": (robot.nv,), "contact_force": (points, 3),
-            "contact_mode": (points,), "stores": ledger.stores.shape, "joint": ledger.joint.shape,
+            "time": (), "tick": (), "q": (robot.nq,), "v": (robot.nv,),
+            "contact_force": (points, 3), "contact_mode": (points,),
+            "stores": ledger.stores.shape, "joint": ledger.joint.shape,
             "scalar": ledger.scalar.shape, "moved": (), "storage": (), "tank": (),
         }  # fmt: skip
         log = {name: shapes.get(name, (n,)) for name in self._kernel.Log._fields}
@@ -305,13 +307,12 @@ class _Loop:
 
     def _enter(
         self, cursor: tuple[float, int, int, int], periods: "Periods", said: float
-    ) -> tuple[int, tuple[float, int, int, int]]:
-        """Enter the compiled loop at a raw cursor; return why it was left, and where."""
-        plant = self.plant
-        run = tuple(self._channels), tuple(periods), tuple(self._limits), plant.instant_feedback
+    ) -> tuple[int, float, tuple[float, int, int, int]]:
+        """Enter the compiled loop at a raw cursor; return why it was left, when, and where."""
+        plant, (channels, limits, log) = self.plant, self._raw
         return self._kernel.glide(
-            plant.raw, plant.raw_terms, plant.raw_instants, plant.raw_ledger, run,
-            tuple(self._log), cursor, said,
+            plant.raw, plant.raw_terms, plant.raw_instants, plant.raw_ledger,
+            (channels, tuple(periods), limits, plant.instant_feedback), log, cursor, said,
         )  # fmt: skip
 
     def _filled(self) -> int:
@@ -324,10 +325,8 @@ class _Loop:
         cursor = (0.0, 0, 0, kernel.WATCH)
         shown, every = 0, max(1, round(0.1 / self.clock.physics))
         while True:
-            why, cursor = self._enter(cursor, self._periods, self._said)
+            why, plant.time, cursor = self._enter(cursor, self._periods, self._said)
             time, step, event, part = cursor
-            if why != kernel.BLOCKED:
-                plant.time = time
             if progress is not None and step >= shown:
                 progress(plant.time)
                 shown = step - step % every + every

@@ -15,6 +15,7 @@ import numpy as np
 
 from sealag.actuation import Actuators, motors_of
 from sealag.errors import InputError
+from sealag.kernels.ledger import IMPACT, JOINT_FLOWS, SCALAR_FLOWS, STORES, Ledger
 from sealag.robot import Robot
 from sealag.simulation._contacts import Surroundings
 from sealag.simulation._ground import Foot
@@ -82,7 +83,6 @@ class Plant:
         stabilisation: float = 50.0,
     ) -> None:
         from sealag.kernels import contact, dynamics, friction, plant
-        from sealag.kernels.ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES, Ledger
 
         if not (np.isfinite(step) and step > 0):
             raise InputError(f"the step must be a time > 0 s, got {step}")
@@ -99,15 +99,16 @@ class Plant:
         )  # fmt: skip
         self.contacts, mounts = self.surroundings.contacts, self.surroundings.mounts
         self.time, self.instant_feedback = 0.0, not delayed_torque_feedback
-        motors, n = motors_of(actuators, robot.damping), robot.n
-        parts = (robot.tree, mounts, motors, self.contacts)
+        self._motors, n = motors_of(actuators, robot.damping), robot.n
+        parts = (robot.tree, mounts, self._motors, self.contacts)
         self.raw = tuple(tuple(part) for part in parts)
         self.raw_terms = tuple(dynamics.allocate(robot.tree))
         self.now, self._next = (self._allocate() for _ in range(2))
         self.raw_instants = tuple(self.now), tuple(self._next)
         shapes = (len(JOINT_FLOWS), n), (len(SCALAR_FLOWS),), (len(STORES),), (1,)
-        self.ledger, gained = (Ledger(*map(np.zeros, shapes)) for _ in range(2))
-        self.raw_ledger, self._raw_gained = tuple(self.ledger), tuple(gained)
+        self.ledger, self._gained = (Ledger(*map(np.zeros, shapes)) for _ in range(2))
+        self.raw_ledger, self._raw_gained = tuple(self.ledger), tuple(self._gained)
+        self._idle = plant.Held(np.zeros(n), np.zeros(n), self.instant_feedback)
         self.impulse = np.zeros((self.surroundings.count, 3))
         self.events: list[ContactEvent] = []
 
@@ -153,7 +154,10 @@ class Plant:
             self._touch(self.surroundings.touching(now, tolerance=1e-4))
         except PlantStop as stop:
             raise InputError(f"the run cannot begin: {stop.message}") from None
-        self._kernel.begin_books(self.raw, tuple(now), self.raw_ledger)
+        for book in self.ledger:
+            book[:] = 0.0
+        self._update_stores()
+        self.ledger.moved[0] = 0.0
 
     def refuse_long_step(self) -> None:
         """Refuse a step that is too long for the springs and dampers where the robot is now.
@@ -177,7 +181,8 @@ class Plant:
             t: The time that the measurement says, s.
             out: The row of a `Measurement` with one contact flag for each foot.
         """
-        self._contact.sense(tuple(self.contacts), tuple(self.now), t, out)
+        contacts = self.contacts
+        self._contact.sense(tuple(self.now), contacts.closed, contacts.frame, t, out)
 
     # Motion ------------------------------------------------------------------------------------
     def push(self, load: Array) -> None:
@@ -229,10 +234,7 @@ class Plant:
 
     def _try(self, step: float, held: "Held") -> None:
         """Fill the next instant with the state one step ahead in the present contact modes."""
-        solved = self._kernel.advance(
-            self.raw, self.raw_terms, self.raw_instants, tuple(held), step, self._raw_gained
-        )
-        if not solved:
+        if self._act(self._kernel.STEP, held=held, step=step)[0]:
             raise self._unsolvable(self._next)
         if not math.isfinite(self._next.energy.sum()):
             raise PlantStop(
@@ -242,12 +244,29 @@ class Plant:
 
     def _take(self, step: float) -> None:
         """Take the next instant for the present one, and book the step."""
-        self._kernel.accept(self.raw, self.raw_instants, self._raw_gained, self.raw_ledger)
+        for part, there in zip(self.now, self._next):
+            part[:] = there
+        self.ledger.joint[:] += self._gained.joint
+        self.ledger.scalar[:] += self._gained.scalar
+        self._update_stores()
         self.time += step
+
+    def _update_stores(self) -> None:
+        self._kernel.update_stores(tuple(self._motors), tuple(self.now), self.raw_ledger)
+
+    def _act(
+        self, what: int, *, held: "Held | None" = None, step: float = 0.0,
+        touching: IntArray | None = None,
+    ) -> tuple[int, float]:  # fmt: skip
+        """Do one thing, see the kernel."""
+        return self._kernel.act(
+            self.raw, self.raw_terms, self.raw_instants, what, tuple(held or self._idle), step,
+            self._raw_gained, self.contacts.closed if touching is None else touching, self.impulse,
+        )  # fmt: skip
 
     def _evaluate(self) -> None:
         """Evaluate dynamics and contact forces of the present instant at its q, v and motors."""
-        if not self._contact.evaluate(self.raw, self.raw_terms, tuple(self.now)):
+        if self._act(self._kernel.EVALUATE)[0]:
             raise self._unsolvable(self.now)
 
     def _unsolvable(self, tried: "Instant") -> PlantStop:
@@ -309,7 +328,8 @@ class Plant:
             touched = self.contacts.closed.copy()
             lost = self._resolve(mask, impact=True)
             self._evaluate()
-            self._kernel.book_impact(self.raw, tuple(now), lost, self.raw_ledger)
+            self.ledger.scalar[IMPACT] += lost
+            self._update_stores()
             self._resolve(around.touching(now))
             around.lower_floors(now, touched)
             self._evaluate()
@@ -320,10 +340,8 @@ class Plant:
 
         Points that rebound are open afterwards; impulses obey the friction cone.
         """
-        impulse = self.impulse if impact else np.zeros_like(self.impulse)
-        status, lost = self._contact.resolve(
-            self.raw, self.raw_terms, tuple(self.now), mask, impact, impulse
-        )
+        what = self._kernel.STRIKE if impact else self._kernel.SETTLE
+        status, lost = self._act(what, touching=mask)
         if status != self._friction.SETTLED:
             feet = [foot.contact.frame for foot in self.surroundings.feet]
             touching = sorted({feet[f] for f in self.surroundings.foot_of[mask.nonzero()[0]]})

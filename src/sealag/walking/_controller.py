@@ -77,7 +77,7 @@ class WalkingController:
             robot, actuators, period=period, prediction=self.options.prediction,
             odometry=self.options.odometry,
         )  # fmt: skip
-        self._gains, self._embedded_gains = _gains(self.options, period)
+        self._raw_gains, self._raw_lead = _gains(self.options, period)
         self._rates, self._smooth, self._first = np.zeros(robot.n), np.zeros(robot.n), True
         self.tau_task = np.zeros(robot.n)
 
@@ -131,7 +131,11 @@ class WalkingController:
         step, body = self.step, self._body
         phase = step.phase(now)
         self.placement.update(
-            phase, step, body.terms.com, body.terms.com_velocity, angular=body.angular,
+            phase,
+            step,
+            body.terms.com,
+            body.terms.com_velocity,
+            angular=body.angular,
             period=self._period,
         )
         if phase >= self.gait.transfer_time:
@@ -145,7 +149,7 @@ class WalkingController:
             self._smooth[:], self._first = self.tau_task.clip(-limit, limit), False
         self._kernel.carry(
             self.tau_task, self._torque_limit, self._smooth, self._rates, self._estimator.tau_sea,
-            self._D, self._D_by_K, self._embedded_gains, out,
+            self._D, self._D_by_K, self._raw_lead, out,
         )  # fmt: skip
         self._estimator.sent(out, t + age + options.embedded_delay)
 
@@ -195,26 +199,41 @@ class WalkingController:
         """Set ``tau_task`` and the planned joint rates; return whether they are finite."""
         body, step = self._body, self.step
         still = not self.options.acceleration_feedforward
+        reference = self._kernel.Reference(
+            height=step.height, height_time=step.height_time(now), swing=step.swing, phase=phase,
+            transfer_time=self.gait.transfer_time, stance=step.stance, still=still,
+        )  # fmt: skip
         return self._kernel.law(
-            body.raw_terms, body.raw_mounts, body.v, body.gravity() if still else body.terms.nle,
-            still, step.height, step.swing, phase,
-            (self.gait.transfer_time, step.height_time(now)), step.stance, self._gains,
-            self.tau_task, self._rates,
+            body.raw_feet, body.v, body.gravity() if still else body.terms.nle, tuple(reference),
+            self._raw_gains, self.tau_task, self._rates,
         )  # fmt: skip
 
 
-def _gains(options: WalkingOptions, period: float) -> tuple[Array, Array]:
-    """Return the numbers that the kernels of law and command take."""
-    stiffness = [options.height_stiffness, options.posture_stiffness, options.swing_stiffness]
-    damping = [2.0 * options.task_damping * math.sqrt(k) for k in stiffness]
-    planned = 1.0 if options.acceleration_feedforward else 0.0
-    lead = options.lead_time if options.lead else 0.0
-    keep = math.exp(-period / options.lead_time)
-    forward = 1.0 if options.velocity_feedforward else 0.0
-    return (
-        np.array([*stiffness, *damping, planned, options.position_rate, _DAMPING]),
-        np.array([keep, lead, forward, options.torque_feedback]),
+def _gains(options: WalkingOptions, period: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the raw gains and lead that the kernels of law and command take."""
+    from sealag.kernels.walking_law import Gains, Lead
+
+    def damping(stiffness: float) -> float:
+        return 2.0 * options.task_damping * math.sqrt(stiffness)
+
+    gains = Gains(
+        height_stiffness=options.height_stiffness,
+        posture_stiffness=options.posture_stiffness,
+        swing_stiffness=options.swing_stiffness,
+        height_damping=damping(options.height_stiffness),
+        posture_damping=damping(options.posture_stiffness),
+        swing_damping=damping(options.swing_stiffness),
+        planned=1.0 if options.acceleration_feedforward else 0.0,
+        position_rate=options.position_rate,
+        damping=_DAMPING,
     )
+    lead = Lead(
+        keep=math.exp(-period / options.lead_time),
+        time=options.lead_time if options.lead else 0.0,
+        forward=1.0 if options.velocity_feedforward else 0.0,
+        feedback=options.torque_feedback,
+    )
+    return tuple(map(float, gains)), tuple(map(float, lead))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,8 +24,7 @@ class Body:
         v: Velocity (nv,).
         terms: Its rigid-body terms, live.
         raw_tree: The robot, as kernels take it.
-        raw_terms: Its terms, likewise.
-        raw_mounts: How the feet are fixed, likewise.
+        raw_feet: Its terms and how the feet are fixed, likewise.
         angular: Angular momentum about the centre of mass (3,), live.
     """
 
@@ -33,8 +32,8 @@ class Body:
         self._workspace, self._feet = robot.workspace(), feet
         at = self._workspace
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
-        self.terms, self.raw_tree, self.raw_terms = at.terms, tuple(robot.tree), tuple(at.terms)
-        self.raw_mounts, self.angular = tuple(robot.frame_mounts(feet)), at.momentum[3:]
+        self.terms, self.raw_tree, self.angular = at.terms, tuple(robot.tree), at.momentum[3:]
+        self.raw_feet = tuple(at.terms), tuple(robot.frame_mounts(feet))
 
     def update(self) -> None:
         """Evaluate the terms at ``q`` and ``v``."""
@@ -78,8 +77,10 @@ class Estimator:
 
         self._kernel = walking_state
         self._period, self._prediction, self._odometry = period, prediction, odometry
-        self._K = np.ascontiguousarray(actuators.spring_stiffness)
-        self._table = motor_table(actuators, period)
+        self._springs = walking_state.Springs(
+            stiffness=np.ascontiguousarray(actuators.spring_stiffness),
+            table=motor_table(actuators, period),
+        )
         self._motor = np.zeros((robot.n, 2))
         self._anchor, self._stance = np.zeros((2, 3)), 0
         self._ring = np.full(_RING, -np.inf), np.zeros((_RING, robot.n))
@@ -131,11 +132,18 @@ class Estimator:
         if self._odometry:
             self._step_over(body, step, measured)
         self._motor[:, 0], self._motor[:, 1] = theta, theta_dot
-        clock = measured, self._period, step.begin, step.begin + step.transfer_time
-        self._kernel.foresee(
-            body.raw_tree, body.raw_terms, body.raw_mounts, body.q, body.v, self._motor, step.stance,
-            self._stance if self._odometry else -1, self._anchor, self._K, self._table, clock,
-            ticks, self._ring, self._newest, self.tau_sea,
+        kernel, (arrival, command) = self._kernel, self._ring
+        support = kernel.Support(
+            stance=step.stance, foot=self._stance if self._odometry else -1, anchor=self._anchor
+        )
+        timing = kernel.Timing(
+            measured=measured, period=self._period, ticks=ticks, touchdown=step.begin,
+            lift_off=step.begin + step.transfer_time,
+        )  # fmt: skip
+        flight = kernel.Flight(arrival=arrival, command=command, newest=self._newest)
+        kernel.foresee(
+            (body.raw_tree, *body.raw_feet), tuple(support), tuple(self._springs), tuple(timing),
+            tuple(flight), body.q, body.v, self._motor, self.tau_sea,
         )  # fmt: skip
 
     def _step_over(self, body: Body, step: StepReferences, t: float) -> None:

@@ -33,11 +33,12 @@ class Placement:
         self._kernel, self._gait, self._options, self._mass = walking, gait, options, mass
         self.plan = gait.periodic()
         plan = self.plan
-        self._numbers = np.array(
-            [
-                gait.step_time, gait.transfer_time, plan.rate, plan.growth, plan.carried,
-                plan.end_forward, plan.end_outward, *_FORWARD, gait.smallest_width, _WIDEST, 1.0,
-            ]
+        nearest, farthest = _FORWARD
+        self._wanted = walking.Gait(
+            step_time=gait.step_time, transfer_time=gait.transfer_time, rate=plan.rate,
+            growth=plan.growth, carried=plan.carried, end_forward=plan.end_forward,
+            end_outward=plan.end_outward, nearest=nearest, farthest=farthest,
+            narrowest=gait.smallest_width, widest=_WIDEST, side=1.0,
         )  # fmt: skip
         self._end, self._momentum = np.zeros((2, 2)), np.zeros(2)
         self._fresh = True
@@ -61,7 +62,7 @@ class Placement:
             angular: Angular momentum about the CoM (3,), kg m²/s.
             period: Time since the last call, s.
         """
-        gait, options, numbers = self._gait, self._options, self._numbers
+        gait, options, kernel = self._gait, self._options, self._kernel
         speed, momentum = float(com_rate[0]), self._momentum
         if options.momentum_placement:
             weight = self._mass * max(float(com[2] - step.new[2]), 0.4)
@@ -72,11 +73,13 @@ class Placement:
             share = 1.0 - math.exp(-period / options.placement_time)
         self._fresh = False
         faster = 1.0 + (self._faster if options.bias_gain > 0.0 else 0.0)
-        numbers[5], numbers[11] = self.plan.end_forward * faster, step.outward
-        x, y = self._kernel.capture_end(
-            com, com_rate, momentum, step.old, step.new, step.height, step.offset, phase, numbers,
-            share, self._end,
-        )  # fmt: skip
+        wanted = self._wanted._replace(
+            end_forward=self.plan.end_forward * faster, side=step.outward
+        )
+        now = kernel.StepNow(step.old, step.new, step.height, step.offset, phase)
+        x, y = kernel.capture_end(
+            com, com_rate, momentum, tuple(now), tuple(wanted), share, self._end
+        )
         if gait.step_time - phase > options.placement_freeze:
             step.target[0], step.target[1], step.target[2] = x, y, step.foot_height(x, y)
 

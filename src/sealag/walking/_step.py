@@ -47,7 +47,10 @@ class StepReferences:
         self.swing = np.zeros((3, 3))
         self.swinging = False
         self._now, self._end = np.zeros(3), np.zeros(3)
-        self._numbers = np.array([gait.step_time, gait.transfer_time, _STILL, _SEARCH])
+        self._plan = walking.SwingPlan(
+            step_time=gait.step_time, transfer_time=gait.transfer_time, still=_STILL,
+            search=_SEARCH,
+        )  # fmt: skip
         self._lift, self._bump = 0.0, gait.clearance
 
     def _stand(self, stance: Side) -> None:
@@ -139,5 +142,11 @@ class StepReferences:
     def move(self, t: float, period: float) -> None:
         """Move the swing reference to ``t`` (s), one ``period`` (s) after the last."""
         self._kernel.swing(
-            self.swing, self.target, self.phase(t), period, self._numbers, self._lift, self._bump
+            self.swing,
+            self.target,
+            self.phase(t),
+            period,
+            tuple(self._plan),
+            self._lift,
+            self._bump,
         )

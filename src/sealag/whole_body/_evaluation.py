@@ -9,8 +9,8 @@ from sealag.errors import ContractionError, RobotError
 from sealag.robot import Contact, Robot
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body._law import Law
-from sealag.whole_body._task_reader import read_tasks
 from sealag.whole_body._tank import EnergyTank, TankFlow
+from sealag.whole_body._task_reader import read_tasks
 from sealag.whole_body._tasks import (
     FORM_CODE,
     RANK_TOLERANCE,
@@ -215,7 +215,9 @@ class LawEvaluation:
 
     def torque(self, out: Array) -> None:
         """Write l (n,) of the current error and matrices."""
-        self._kernel.torque(self._raw, out)
+        space = self.space
+        gravity = space.gravity if self.gravity_is_fed_back else self.planned_gravity
+        out[:] = space.J_star.T @ (space.stiffness @ self.error) + gravity
 
     def leave_to_higher(self, rate: Array) -> None:
         """Project the rates (m,) of the tasks into the null space of the higher tasks, in place."""

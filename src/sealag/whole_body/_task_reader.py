@@ -13,6 +13,7 @@ from sealag.whole_body._tasks import TaskKind
 if TYPE_CHECKING:
     from sealag.kernels.control_law import Tasks
 
+
 def read_tasks(
     robot: Robot, law: Law, contacts: tuple[Contact, ...], *, posture: ArrayLike
 ) -> tuple[list[str], "Tasks"]:
