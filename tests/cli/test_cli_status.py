@@ -28,6 +28,7 @@ COMMANDS = {
     "margin": (["margin", HELD], "sealag.cli._commands.margin_project"),
     "verify": (["verify", "c.json"], "sealag.cli._commands.verify_certificate"),
     "simulate": (["simulate", HELD], "sealag.cli._simulate.simulate_project"),
+    "cite": (["cite"], "sealag.cli._cite.show_citations"),
     "paper": (["paper"], "sealag.cli._commands.write_paper"),
 }
 ENDS = {

@@ -230,6 +230,14 @@ def paper(
     write_paper(out, as_json=as_json)
 
 
+@app.command()
+def cite(as_json: Json = False) -> None:
+    """Print BibTeX entries for sealag and for the paper that it reproduces."""
+    from sealag.cli._cite import show_citations
+
+    show_citations(as_json=as_json)
+
+
 def show_json(answer: dict[str, Any]) -> None:
     """Print one JSON object to standard output.
 
