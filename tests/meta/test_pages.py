@@ -20,7 +20,7 @@ def named_paths(text: str) -> set[str]:
 
 def named_commands(text: str) -> set[str]:
     """Return the subcommands of sealag that a page names."""
-    return set(re.findall(r"\bsealag ([a-z]+)\b", " ".join(code_of(text))))
+    return set(re.findall(r"\bsealag ([a-z]+)\b", "\n".join(code_of(text))))
 
 
 def code_of(text: str) -> list[str]:
