@@ -8,6 +8,7 @@ import pytest
 
 import sealag
 from helpers.certificates import failures, half_a_step, plain
+from helpers.designs import EXAMPLES
 from helpers.solvers import LIES, Forgetful, Lying
 from sealag.cli import main
 from sealag.design import save_motion
@@ -86,7 +87,7 @@ def test_a_bad_solver_whose_part_is_enough_costs_nothing(walk):
 
 def crawl():
     """Two priority levels under a delay between 1/Σw and the bound of (31)."""
-    return late(sealag.load("examples/anymal_crawl.toml"), 0.095)
+    return late(sealag.load(EXAMPLES / "anymal_crawl.toml"), 0.095)
 
 
 @pytest.mark.parametrize(

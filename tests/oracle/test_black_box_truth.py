@@ -16,7 +16,6 @@ from oracle.black_box.roots import Late, first_crossing, roots
 from sealag.design import load_motion
 
 CASES = Path(__file__).parent / "black_box" / "cases"
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 def box(path, *, replace=(), folder=None, **options):

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import sealag
+from helpers.designs import EXAMPLES
 from sealag.errors import ProjectError
 
-BAXTER = (Path(__file__).resolve().parents[2] / "examples/baxter.toml").read_text()
+BAXTER = (EXAMPLES / "baxter.toml").read_text()
 
 NETWORKS = {
     "constant": """

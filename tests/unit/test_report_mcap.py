@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from helpers.designs import EXAMPLES
 from sealag.cli import main
 from sealag.errors import FileError, InputError
 from sealag.report import McapRecorder, read_recording
@@ -151,7 +152,7 @@ def _no_file_longer_than(size):
 
 def _simulate(path, capsys):
     with pytest.raises(SystemExit) as stop:
-        main(["simulate", "examples/baxter.toml", "--duration", "0.15", "--out", str(path)])
+        main(["simulate", EXAMPLES / "baxter.toml", "--duration", "0.15", "--out", str(path)])
     return stop.value.code, *capsys.readouterr()
 
 

@@ -38,11 +38,6 @@ def test_contact_frame_of_a_slope(kind):
     np.testing.assert_allclose(contact_frame(FlatGround(level=2.0), 0, 0), np.eye(3))
 
 
-@pytest.fixture(scope="module")
-def hume():
-    return load_robot("bundled:hume.urdf", floating_base=True)
-
-
 def _run(robot, ground, friction, duration=0.2):
     springs = actuators(
         robot.joints,

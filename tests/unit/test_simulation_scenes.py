@@ -9,7 +9,7 @@ from helpers.controllers import JointPD
 from sealag.actuation import actuators
 from sealag.delay import Constant, Link
 from sealag.errors import ContractionError, InputError, SolverError, UnknownNameError
-from sealag.robot import Contact, ContactKind, load_robot
+from sealag.robot import Contact, ContactKind
 from sealag.simulation import (
     Clock,
     EventKind,
@@ -26,11 +26,6 @@ from sealag.simulation import (
 from sealag.simulation._plant import Plant
 
 FEET = ("left_foot", "right_foot")
-
-
-@pytest.fixture(scope="module")
-def hume():
-    return load_robot("bundled:hume.urdf", floating_base=True)
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from helpers.designs import EXAMPLES
 from helpers.small_systems import arm, arm_system, joint_task
 from sealag.design import load, margin_of
 from sealag.margin import delay_margin
@@ -164,7 +165,7 @@ def test_static_joint_state_is_stiffer_by_the_springs(tmp_path):
 
 
 def test_frozen_loop_of_a_fixed_robot_matches_its_matrices():
-    system = load("examples/baxter.toml")
+    system = load(EXAMPLES / "baxter.toml")
     loop, robot, n = system.frozen(), system.robot, 14
     q = system.rest().q
     stiffness = robot.gravity_gradient(q) + np.diag(system.actuators.spring_stiffness)
@@ -199,7 +200,7 @@ def test_symmetries_are_what_contacts_leave_and_no_task_feels(contacts, count, f
 def test_contact_forces_are_part_of_the_links():
     """The sideways sway of ANYmal by the forces in its feet: 87.4415 ms; 87.313 without those that
     joints see, 90.5 without any."""
-    system = load("examples/anymal.toml")
+    system = load(EXAMPLES / "anymal.toml")
     loop = system.frozen()
     assert margin_of(loop).delay == pytest.approx(87.4415e-3, abs=5e-8)
     wrong = loop.A_0.copy()
