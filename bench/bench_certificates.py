@@ -10,13 +10,13 @@ import cvxpy as cp
 import numpy as np
 
 import sealag
-from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.passivity import (
     ClarabelDirect,
     MultiplierProblem,
     max_delay,
     max_delay_common_from_stiffness,
 )
+from sealag.walking import paper_terrain, plan_walk, walk_motion
 
 SIZES = ((3, 3), (6, 6), (12, 12))
 BIG = 1_000

@@ -43,7 +43,7 @@ def test_answers_with_the_contract(design, criterion, tmp_path, cli):
 
 def test_motion_of_many_instants(tmp_path, cli):
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import paper_terrain, plan_walk, walk_motion
 
     system = load("bundled:hume")
     motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=200.0)
@@ -71,7 +71,7 @@ def test_motion_of_many_instants(tmp_path, cli):
 def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, cli):
     """Seven steps at 1 kHz, default proofs, common and time-varying multipliers."""
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import paper_terrain, plan_walk, walk_motion
 
     system = load("bundled:hume")
     motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=7), rate=1000.0)
@@ -104,7 +104,7 @@ def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, cli):
 
 def test_proofs_are_as_many_as_asked_for(tmp_path, cli):
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import paper_terrain, plan_walk, walk_motion
 
     system = load("bundled:hume")
     walk, out = tmp_path / "walk.npz", tmp_path / "c.json"

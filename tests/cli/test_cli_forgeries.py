@@ -3,7 +3,6 @@
 import functools
 import json
 import time
-from pathlib import Path
 
 import pytest
 

@@ -1,7 +1,6 @@
 """`sealag margin`: the exact margin, and stable and unstable delays beyond it."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from helpers.designs import EXAMPLES
 from sealag.cli._simulate import summary
 from sealag.delay import RoundTrip, Sinusoid
 from sealag.design import load, resolve_project, simulate
-from sealag.locomotion import WalkingGait, WalkingOptions
 from sealag.report import read_recording
-
+from sealag.walking import WalkingGait, WalkingOptions
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ import sealag
 from helpers.designs import EXAMPLES
 from sealag.design import System
 from sealag.errors import CertificateError
-from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.passivity import content_digest, read_certificate, verify, write_certificate
 from sealag.robot import Motion
+from sealag.walking import paper_terrain, plan_walk, walk_motion
 from sealag.whole_body import MotorAngles, Tank
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from helpers.designs import EXAMPLES
 from sealag.design import load
-from sealag.locomotion import FlatTerrain, begin_walk
+from sealag.walking import FlatTerrain, begin_walk
 from sealag.whole_body import Controller, Measurement, Tank
 
 WARM, TICKS = 1_000, 10_000

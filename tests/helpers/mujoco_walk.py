@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 
 from helpers.mujoco_sea import MujocoRobot
+from humanoids2016 import WalkCase
 from sealag.design import System
-from sealag.locomotion import begin_walk
-from sealag.paper import WalkCase
+from sealag.walking import begin_walk
 from sealag.whole_body import Measurement
 
 TICK = 1e-3

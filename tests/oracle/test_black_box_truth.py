@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sealag
+from helpers.designs import EXAMPLES
 from oracle.black_box.box import BlackBox
 from oracle.black_box.law import Unsettled
 from oracle.black_box.rest import NoEquilibrium

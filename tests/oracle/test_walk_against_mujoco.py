@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from helpers.mujoco_walk import mujoco_walk
+from humanoids2016 import WalkCase, simulate_walk
 from sealag.design import load
-from sealag.paper import WalkCase, simulate_walk
 
 CASE = WalkCase(steps=7, physics=1.25e-4, embedded=1e-3)
 

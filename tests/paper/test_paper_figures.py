@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sealag.design import load
-from sealag.locomotion import FlatTerrain, paper_terrain, plan_walk, walk_motion
-from sealag.paper import (
+from humanoids2016 import (
     PUBLISHED_LAW,
     TorqueTrace,
     Verdict,
@@ -26,6 +24,8 @@ from sealag.paper import (
     walk_claim,
     walk_success,
 )
+from sealag.design import load
+from sealag.walking import FlatTerrain, paper_terrain, plan_walk, walk_motion
 from sealag.whole_body import StiffnessForm
 
 HUME = load("bundled:hume")

@@ -9,30 +9,28 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sealag.design import certify, load
-from sealag.locomotion import paper_terrain, plan_walk, walk_motion
-from sealag.paper import (
+from humanoids2016 import (
     AblationTable,
     DelayMap,
     WalkCase,
+    beyond_section,
     delay_map,
+    energy_section,
     figure_4,
     figure_4_claims,
     figure_5,
-    random_plant_table,
-    simulate_walk,
-    unsafe_examples,
-    walk_success,
-)
-from sealag.report import (
-    beyond_section,
-    energy_section,
     figure_5_section,
     limits_section,
     means_section,
+    random_plant_table,
+    simulate_walk,
+    unsafe_examples,
     walk_section,
+    walk_success,
     write_paper_page,
 )
+from sealag.design import certify, load
+from sealag.walking import paper_terrain, plan_walk, walk_motion
 
 
 class Links(HTMLParser):

@@ -1,7 +1,5 @@
 """The links that a project file describes are those that run, and its d_1 bounds what arrives."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 

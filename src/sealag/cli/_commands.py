@@ -250,10 +250,10 @@ def _second(path: Path, *, as_json: bool) -> int:
 
 def write_paper(out: Path, *, as_json: bool) -> None:
     """Compute and write the paper page."""
-    from sealag.cli._paper import make_paper
+    from humanoids2016 import reproduce
 
     make_folder(out)
-    answer = make_paper(out, progress=lambda text: print(text, file=sys.stderr, flush=True))
+    answer = reproduce(out, progress=lambda text: print(text, file=sys.stderr, flush=True))
     if as_json:
         show_json(answer)
     else:

@@ -8,12 +8,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 import sealag
+from humanoids2016 import WalkCase, measure_walk
 from sealag.cli._app import show_json
 from sealag.cli._commands import compile_kernels
 from sealag.design import System, load, resolve_project, scenario_duration, simulate
 from sealag.errors import InputError
 from sealag.files import check_output
-from sealag.paper import WalkCase, measure_walk
 from sealag.report import write_run
 from sealag.simulation import Outcome, Passivity, Run
 from sealag.typing import Array

@@ -12,7 +12,6 @@ from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
 from sealag.design._walking import Walking
 from sealag.errors import InputError, either
-from sealag.locomotion import FlatTerrain, begin_walk
 from sealag.passivity import joint_multiplier
 from sealag.robot import Contact, ContactKind
 from sealag.simulation import (
@@ -30,6 +29,7 @@ from sealag.simulation import (
     touching_posture,
 )
 from sealag.typing import Array
+from sealag.walking import FlatTerrain, begin_walk
 from sealag.whole_body import Controller, TaskKind, TickController
 
 LONGEST_STEP = 1e-3

@@ -5,7 +5,8 @@ from enum import StrEnum
 from typing import Any
 
 from sealag.errors import InputError, either, near
-from sealag.locomotion import (
+from sealag.robot import Robot
+from sealag.walking import (
     FlatTerrain,
     Terrain,
     WalkingGait,
@@ -14,7 +15,6 @@ from sealag.locomotion import (
     rough_terrain,
     stairs,
 )
-from sealag.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sealag.errors import InputError, RobotError
-from sealag.locomotion import (
+from sealag.robot import load_robot
+from sealag.walking import (
     FlatTerrain,
     ProfileTerrain,
     paper_terrain,
@@ -14,7 +15,6 @@ from sealag.locomotion import (
     stairs,
     walk_motion,
 )
-from sealag.robot import load_robot
 
 HUME = load_robot("bundled:hume.urdf", floating_base=True)
 VARIED = {"apex_speed": [0.6, 0.55, 0.62, 0.6], "step_length": [0.4, 0.46, 0.43]}

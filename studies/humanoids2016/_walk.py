@@ -5,17 +5,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from humanoids2016._walk_errors import NoisySensors, SensorNoise, wrong_robot, wrong_springs
 from sealag.delay import Delays
 from sealag.design import System, Walking, walk_scene
-from sealag.locomotion import (
-    Terrain,
-    WalkingController,
-    WalkingGait,
-    WalkingOptions,
-    begin_walk,
-    paper_terrain,
-)
-from sealag.paper._walk_errors import NoisySensors, SensorNoise, wrong_robot, wrong_springs
 from sealag.robot import Robot, Workspace
 from sealag.simulation import (
     Clock,
@@ -27,6 +19,14 @@ from sealag.simulation import (
     closed_loop,
 )
 from sealag.typing import Array
+from sealag.walking import (
+    Terrain,
+    WalkingController,
+    WalkingGait,
+    WalkingOptions,
+    begin_walk,
+    paper_terrain,
+)
 from sealag.whole_body import Measurement, TickController
 
 TICK = 1e-3  # s, period of the central controller

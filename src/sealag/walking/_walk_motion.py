@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from sealag.errors import RobotError
-from sealag.locomotion._planner import WalkPlan
 from sealag.robot import Contact, Motion, Robot, Workspace
 from sealag.typing import Array
+from sealag.walking._planner import WalkPlan
 
 FEET = {"right": "right_foot", "left": "left_foot"}
 

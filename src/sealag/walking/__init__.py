@@ -1,7 +1,7 @@
 """Walking over rough terrain: ground, phase-space plan, whole-body motion."""
 
-from sealag.locomotion._planner import Stance, WalkPlan, plan_walk
-from sealag.locomotion._terrain import (
+from sealag.walking._planner import Stance, WalkPlan, plan_walk
+from sealag.walking._terrain import (
     FlatTerrain,
     ProfileTerrain,
     Terrain,
@@ -9,11 +9,11 @@ from sealag.locomotion._terrain import (
     rough_terrain,
     stairs,
 )
-from sealag.locomotion._walk_motion import walk_motion
-from sealag.locomotion._walking import WalkingController, begin_walk
-from sealag.locomotion._walking_options import Prediction, WalkingGait, WalkingOptions
-from sealag.locomotion._walking_placement import PeriodicGait, periodic_gait
-from sealag.locomotion._walking_start import walking_start
+from sealag.walking._walk_motion import walk_motion
+from sealag.walking._walking import WalkingController, begin_walk
+from sealag.walking._walking_options import Prediction, WalkingGait, WalkingOptions
+from sealag.walking._walking_placement import PeriodicGait, periodic_gait
+from sealag.walking._walking_start import walking_start
 
 __all__ = [
     "FlatTerrain",

@@ -7,10 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from humanoids2016._claims import Claim
+from humanoids2016._figure4 import Figure4
+from humanoids2016._figure5 import TorqueTrace
+from humanoids2016._plots import plot_figure_4, plot_walk_bounds
+from humanoids2016._random_table import RandomPlantTable
+from humanoids2016._unsafe import UnsafeExample
 from sealag.files import write_text
-from sealag.paper import Claim, Figure4, RandomPlantTable, TorqueTrace, UnsafeExample
-from sealag.report._page import Cell, Figure, Section, Table, Text, render_page
-from sealag.report._plots import plot_figure_4, plot_walk_bounds
+from sealag.report import Cell, Figure, Section, Table, Text, render_page
 
 TORQUE_STRIDE = 2
 """Every how many logged instants of Fig. 5 are written."""

@@ -5,12 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from humanoids2016._ablation import PUBLISHED_LAW, AblationTable
+from humanoids2016._plots import plot_gait
+from humanoids2016._walk import Walk
+from humanoids2016._walk_table import WalkRow
 from sealag.delay import RoundTrip
 from sealag.design import System
-from sealag.paper import PUBLISHED_LAW, AblationTable, Walk, WalkRow
 from sealag.passivity import Certificate
-from sealag.report._page import Cell, Figure, Raw, Section, Table, Text
-from sealag.report._plots import plot_gait
+from sealag.report import Cell, Figure, Raw, Section, Table, Text
 from sealag.robot import Robot
 from sealag.typing import Array
 
@@ -298,6 +300,6 @@ def playback(robot: Robot, walk: Walk) -> str:
     xs = np.arange(frames[0]["base"][0] - 1.2, frames[-1]["base"][0] + 1.4, 0.05)
     ground = [[round(float(x), 3), round(walk.case.terrain.height(x, 0.0), 3)] for x in xs]
     data = {"rate": FRAMES_PER_SECOND, "terrain": ground, "frames": frames}
-    environment = jinja2.Environment(loader=jinja2.PackageLoader("sealag.report"), autoescape=True)
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("humanoids2016"), autoescape=True)
     template = environment.get_template("playback.html")
     return template.render(data=Markup(json.dumps(data, separators=(",", ":"))))

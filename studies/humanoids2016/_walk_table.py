@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from humanoids2016._claims import Claim, Verdict
+from humanoids2016._walk import Walk, WalkCase, at_delay_scale, simulate_walk
+from humanoids2016._walk_errors import SensorNoise
 from sealag.delay import Delays
 from sealag.design import System, load
-from sealag.locomotion import Terrain, rough_terrain
-from sealag.paper._claims import Claim, Verdict
-from sealag.paper._walk import Walk, WalkCase, at_delay_scale, simulate_walk
-from sealag.paper._walk_errors import SensorNoise
+from sealag.walking import Terrain, rough_terrain
 
 ENOUGH = 0.95
 """Share of terrains that must be walked."""

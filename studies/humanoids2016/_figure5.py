@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from humanoids2016._claims import Claim, Verdict
+from humanoids2016._walk import TICK, Walk, WalkCase, simulate_walk
 from sealag.design import load
-from sealag.paper._claims import Claim, Verdict
-from sealag.paper._walk import TICK, Walk, WalkCase, simulate_walk
 from sealag.typing import Array
 
 BETAS = (0.1, 0.5, 1.0, 2.0)

@@ -3,10 +3,10 @@
 import numpy as np
 
 from sealag.actuation import Actuators
-from sealag.locomotion._walking_options import Prediction
-from sealag.locomotion._walking_step import StepReferences
 from sealag.robot import Robot
 from sealag.typing import Array
+from sealag.walking._walking_options import Prediction
+from sealag.walking._walking_step import StepReferences
 
 _RING = 512
 

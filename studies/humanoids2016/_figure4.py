@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from humanoids2016._claims import Claim, Verdict
+from humanoids2016._random_table import RandomPlantTable
 from sealag.design import System, certified_bounds
-from sealag.paper._claims import Claim, Verdict
-from sealag.paper._random_table import RandomPlantTable
 from sealag.passivity import max_delay
 from sealag.robot import Contact, Motion, Robot
 from sealag.simulation import Run

@@ -4,11 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sealag.paper import DelayMap, Figure4, TorqueTrace, WalkRow
+from humanoids2016._beyond import DelayMap
+from humanoids2016._figure4 import Figure4
+from humanoids2016._figure5 import TorqueTrace
+from humanoids2016._plots import plot_delay_map, plot_figure_4, plot_torques
+from humanoids2016._walk_page import rows_table
+from humanoids2016._walk_table import WalkRow
 from sealag.passivity import Certificate
-from sealag.report._page import Cell, Figure, Section, Table, Text
-from sealag.report._plots import plot_delay_map, plot_figure_4, plot_torques
-from sealag.report._walk_page import rows_table
+from sealag.report import Cell, Figure, Section, Table, Text
 
 
 def limits_section(

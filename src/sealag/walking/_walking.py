@@ -6,19 +6,19 @@ import numpy as np
 
 from sealag.actuation import Actuators
 from sealag.errors import InputError, SolverError
-from sealag.locomotion._terrain import Terrain
-from sealag.locomotion._walking_options import (
+from sealag.robot import Robot
+from sealag.typing import Array
+from sealag.walking._terrain import Terrain
+from sealag.walking._walking_options import (
     JointAngles,
     Prediction,
     WalkingGait,
     WalkingOptions,
 )
-from sealag.locomotion._walking_placement import Placement
-from sealag.locomotion._walking_start import walking_start
-from sealag.locomotion._walking_state import Body, Estimator
-from sealag.locomotion._walking_step import StepReferences
-from sealag.robot import Robot
-from sealag.typing import Array
+from sealag.walking._walking_placement import Placement
+from sealag.walking._walking_start import walking_start
+from sealag.walking._walking_state import Body, Estimator
+from sealag.walking._walking_step import StepReferences
 from sealag.whole_body import Measurement
 
 _DAMPING = 1e-9  # share of the trace: bounds torques near a straight knee

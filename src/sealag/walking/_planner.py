@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.locomotion._terrain import Terrain
 from sealag.typing import Array, ArrayLike
+from sealag.walking._terrain import Terrain
 
 GRAVITY = 9.81
 SIDES = ("right", "left")

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from humanoids2016._walk import WalkCase, at_delay_scale
+from humanoids2016._walk_table import WalkRow, walk_success
 from sealag.design import System, certified_bounds, load, margin_of
-from sealag.locomotion import FlatTerrain, rough_terrain, stairs
-from sealag.paper._walk import WalkCase, at_delay_scale
-from sealag.paper._walk_table import WalkRow, walk_success
 from sealag.robot import Motion
 from sealag.simulation import Push
 from sealag.typing import Array
+from sealag.walking import FlatTerrain, rough_terrain, stairs
 from sealag.whole_body import MotorAngles, StaticJoint
 
 PUSH = 0.1  # s

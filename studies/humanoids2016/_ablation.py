@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from humanoids2016._walk import WalkCase, at_delay_scale
+from humanoids2016._walk_table import walk_success
 from sealag.design import load
-from sealag.locomotion import Prediction, Terrain, WalkingOptions
-from sealag.paper._walk import WalkCase, at_delay_scale
-from sealag.paper._walk_table import walk_success
 from sealag.typing import IntArray
+from sealag.walking import Prediction, Terrain, WalkingOptions
 
 PUBLISHED_LAW = "published law"
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.locomotion._walking_options import WalkingGait, WalkingOptions
-from sealag.locomotion._walking_step import StepReferences
 from sealag.typing import Array
+from sealag.walking._walking_options import WalkingGait, WalkingOptions
+from sealag.walking._walking_step import StepReferences
 
 GRAVITY = 9.81
 _FORWARD = (-0.15, 0.55)  # m from the stance foot: what the legs reach

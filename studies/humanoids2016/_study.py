@@ -4,44 +4,30 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from sealag import __version__ as VERSION
-from sealag.design import certify, load, save_motion
-from sealag.locomotion import paper_terrain, plan_walk, walk_motion
-from sealag.paper import (
-    HELD_OUT,
-    PUBLISHED_LAW,
-    ablation_cases,
-    ablation_table,
-    delay_map,
-    figure_4,
-    figure_4_claims,
-    figure_5,
-    figure_5_claims,
+from humanoids2016._ablation import PUBLISHED_LAW, ablation_cases, ablation_table, gait_cases
+from humanoids2016._beyond import HELD_OUT, delay_map, walk_beyond
+from humanoids2016._bounds_page import beyond_section, figure_5_section, limits_section
+from humanoids2016._figure4 import figure_4, figure_4_claims, simulated_motion
+from humanoids2016._figure5 import figure_5, figure_5_claims
+from humanoids2016._paper_page import write_paper_page
+from humanoids2016._random_table import random_plant_table
+from humanoids2016._unsafe import unsafe_examples
+from humanoids2016._walk import simulate_walk
+from humanoids2016._walk_page import energy_section, means_section, walk_section
+from humanoids2016._walk_table import (
     gain_cases,
-    gait_cases,
-    random_plant_table,
     robustness_cases,
     rough_terrains,
-    simulate_walk,
-    simulated_motion,
-    unsafe_examples,
-    walk_beyond,
     walk_claim,
     walk_success,
 )
-from sealag.report import (
-    beyond_section,
-    energy_section,
-    figure_5_section,
-    limits_section,
-    means_section,
-    walk_section,
-    write_paper_page,
-    write_run,
-)
+from sealag import __version__ as VERSION
+from sealag.design import certify, load, save_motion
+from sealag.report import write_run
+from sealag.walking import paper_terrain, plan_walk, walk_motion
 
 
-def make_paper(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
+def reproduce(out: Path, *, progress: Callable[[str], None]) -> dict[str, Any]:
     """Compute everything and write the page, its CSVs, the planned walk and the recording."""
     system = load("bundled:hume")
     progress("[1/7] planning 7 steps and their whole-body motion at 1 kHz")

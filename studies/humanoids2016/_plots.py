@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from sealag.paper import DelayMap, Figure4, TorqueTrace, Walk
+from humanoids2016._beyond import DelayMap
+from humanoids2016._figure4 import Figure4
+from humanoids2016._figure5 import TorqueTrace
+from humanoids2016._walk import Walk
 from sealag.whole_body import StaticJoint, StiffnessForm
 
 COLOURS = ("#0b6e99", "#c0561f", "#5b7f2b")

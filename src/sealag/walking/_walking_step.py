@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from sealag.locomotion._terrain import Terrain
-from sealag.locomotion._walking_options import WalkingGait
 from sealag.typing import Array
+from sealag.walking._terrain import Terrain
+from sealag.walking._walking_options import WalkingGait
 
 _STILL = 0.93  # share of the swing after which the foot no longer moves horizontally
 _SEARCH = 0.3  # m/s at which a foot that has not met the ground is lowered

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from humanoids2016._walk import FEET, WalkCase, simulate_walk
+from humanoids2016._walk_errors import NoisySensors, SensorNoise, wrong_robot
 from sealag.design import load
 from sealag.errors import InputError
 from sealag.kernels import walking
-from sealag.locomotion import (
+from sealag.simulation import Outcome
+from sealag.walking import (
     FlatTerrain,
     WalkingController,
     WalkingGait,
@@ -17,9 +20,6 @@ from sealag.locomotion import (
     rough_terrain,
     walking_start,
 )
-from sealag.paper._walk import FEET, WalkCase, simulate_walk
-from sealag.paper._walk_errors import NoisySensors, SensorNoise, wrong_robot
-from sealag.simulation import Outcome
 from sealag.whole_body import Measurement
 
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.locomotion._terrain import Terrain
-from sealag.locomotion._walking_options import WalkingGait
-from sealag.locomotion._walking_placement import periodic_gait
 from sealag.robot import Robot, Workspace
 from sealag.typing import Array
+from sealag.walking._terrain import Terrain
+from sealag.walking._walking_options import WalkingGait
+from sealag.walking._walking_placement import periodic_gait
 
 _SWING_SPEED = 1.6  # mid-swing speed of the foot in mean speeds of its swing
 _SIDE = (1.0, -1.0)
