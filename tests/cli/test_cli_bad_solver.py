@@ -122,7 +122,7 @@ def test_the_command_line_says_it_too(walk, tmp_path, monkeypatch, capsys):
     system, motion = walk
     path = tmp_path / "walk.npz"
     save_motion(motion, system.robot, path)
-    monkeypatch.setattr("sealag.cli._commands.load", lambda project: system)
+    monkeypatch.setattr("sealag.design.load", lambda project: system)
 
     def answer(*options):
         out = tmp_path / "c.json"
@@ -133,7 +133,7 @@ def test_the_command_line_says_it_too(walk, tmp_path, monkeypatch, capsys):
     code, text = answer("--json")
     assert (code, json.loads(text)["status"]) == (0, "certified")
     starved = functools.partial(sealag.certify, solver=ClarabelDirect(max_iterations=1))
-    monkeypatch.setattr("sealag.cli._commands.certify", starved)
+    monkeypatch.setattr("sealag.design.certify", starved)
     code, text = answer("--json")
     found = json.loads(text)
     assert (code, found["status"]) == (1, "not_certified")

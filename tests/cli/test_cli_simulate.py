@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from helpers.designs import EXAMPLES
-from sealag.cli._simulate import summary
 from sealag.delay import RoundTrip, Sinusoid
 from sealag.design import load, resolve_project, simulate
-from sealag.report import read_recording
+from sealag.report import read_recording, run_summary
 from sealag.walking import WalkingGait, WalkingOptions
 
 
@@ -149,7 +148,7 @@ def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, cli, monkeypatch)
 
     arguments = (EXAMPLES / "baxter.toml", "--duration", "0.01", "--out", out)
     with monkeypatch.context() as patch:
-        patch.setattr("sealag.report._mcap.McapRecorder.note", interrupted)
+        patch.setattr("sealag.report.McapRecorder.note", interrupted)
         code, text, err = cli("simulate", *arguments)
     assert (code, text) == (130, "")
     assert "nothing was recorded" in err
@@ -208,12 +207,12 @@ def test_the_largest_is_printed_and_not_the_mean_or_the_signed_maximum():
         scenario="balance",
         duration=0.3,
     )
-    answer = summary(result, Path("run.mcap"))
+    answer = run_summary(result, recording=Path("run.mcap"))
     assert answer["measurement_age_s"] == result.ages.measurement
     assert answer["measurement_age_s"] > 1.5 * result.measurement_age.mean()
     assert answer["command_age_s"] >= result.command_age.max()
     assert answer["total_age_s"] > answer["command_age_s"]
     law = -np.abs(result.audit.law_injection)
     turned = replace(result, audit=replace(result.audit, law_injection=law))
-    assert summary(turned, Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
+    assert run_summary(turned, recording=Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
     assert answer["injection_error_j"] == result.audit.injection_error > 0.0

@@ -21,13 +21,13 @@ HELD = str(EXAMPLES / "hume_held.toml")
 ALONE = (sys.executable, "-c", "from sealag.cli import main; main()")
 
 COMMANDS = {
-    "init": (["init", "robot.urdf"], "sealag.cli._commands.init_project"),
-    "certify": (["certify", HELD], "sealag.cli._commands.certify_project"),
-    "margin": (["margin", HELD], "sealag.cli._commands.margin_project"),
-    "verify": (["verify", "c.json"], "sealag.cli._commands.verify_certificate"),
-    "simulate": (["simulate", HELD], "sealag.cli._simulate.simulate_project"),
-    "cite": (["cite"], "sealag.cli._cite.show_citations"),
-    "paper": (["paper"], "sealag.cli._commands.write_paper"),
+    "init": (["init", "robot.urdf"], "sealag.design.starter_project"),
+    "certify": (["certify", HELD], "sealag.design.load"),
+    "margin": (["margin", HELD], "sealag.design.load"),
+    "verify": (["verify", "c.json"], "sealag.passivity.verify"),
+    "simulate": (["simulate", HELD], "sealag.design.load"),
+    "cite": (["cite"], "importlib.resources.files"),
+    "paper": (["paper"], "humanoids2016.reproduce"),
 }
 ENDS = {
     InputError("the posture is wrong"): 2,

@@ -17,13 +17,13 @@ from sealag.simulation import (
     Foot,
     Network,
     Outcome,
+    Plant,
     Push,
     Scene,
     closed_loop,
     require_hold,
     touching_posture,
 )
-from sealag.simulation._plant import Plant
 
 FEET = ("left_foot", "right_foot")
 

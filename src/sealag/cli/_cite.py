@@ -1,6 +1,6 @@
 """`sealag cite`: BibTeX entries that ship with the package."""
 
-from importlib.resources import files
+from importlib import resources
 
 from sealag import __version__
 from sealag.cli._app import show_json
@@ -8,7 +8,7 @@ from sealag.cli._app import show_json
 
 def show_citations(*, as_json: bool) -> None:
     """Print the BibTeX entries of sealag and of the paper that it reproduces."""
-    folder = files("sealag.data")
+    folder = resources.files("sealag.data")
     software, paper = (
         (folder / f"cite_{what}.bib").read_text("utf-8").strip() for what in ("software", "paper")
     )

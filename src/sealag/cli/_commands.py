@@ -7,16 +7,9 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+from sealag import design
 from sealag.cli._app import show_json
-from sealag.design import (
-    System,
-    certify,
-    check_question,
-    load,
-    load_motion,
-    resolve_project,
-    starter_project,
-)
+from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import check_output, make_folder, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
@@ -38,7 +31,7 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     named = urdf
     if ":" not in urdf:
         named = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
-    text = starter_project(urdf, floating_base=floating_base, named=named)
+    text = design.starter_project(urdf, floating_base=floating_base, named=named)
     write_text(path, text)
     return path
 
@@ -68,7 +61,11 @@ def _busy(what: str) -> Iterator[None]:
 
 def _motion(system: System, path: Path | None) -> Motion | None:
     chosen = path or system.motion_file
-    return None if chosen is None else load_motion(chosen, system.robot, contacts=system.contacts)
+    return (
+        None
+        if chosen is None
+        else design.load_motion(chosen, system.robot, contacts=system.contacts)
+    )
 
 
 def certify_project(
@@ -86,14 +83,14 @@ def certify_project(
         raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
     if proofs != "all" and not (proofs.isascii() and proofs.isdigit() and int(proofs) > 0):
         raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
-    path = out or Path(f"{resolve_project(project).stem}.certificate.json")
-    system = load(project)
+    path = out or Path(f"{design.resolve_project(project).stem}.certificate.json")
+    system = design.load(project)
     check_output(path, *system.files, *([motion] if motion else []))
     along, count = _motion(system, motion), None if proofs == "all" else int(proofs)
-    check_question(system, along, criterion, time_varying=time_varying, proofs=count)
+    design.check_question(system, along, criterion, time_varying=time_varying, proofs=count)
     compile_kernels()
     with _busy("certifying"):
-        certificate = certify(
+        certificate = design.certify(
             system, along, criterion=criterion, time_varying=time_varying, proofs=count
         )
     write_certificate(certificate, path)
@@ -154,19 +151,17 @@ def margin_project(
     project: str, motion: Path | None, *, horizon_ms: float | None, as_json: bool
 ) -> None:
     """Show the exact local margin at every instant, or at a sample of a long motion."""
-    from sealag.design import local_margins
-
     if horizon_ms is not None and not 0.0 < horizon_ms <= LONGEST_HORIZON_MS:
         raise InputError(
             f"--horizon-ms is {horizon_ms:g}; it must be more than 0 and at most "
             f"{LONGEST_HORIZON_MS:g}."
         )
-    system = load(project)
+    system = design.load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
     along = _motion(system, motion)
     compile_kernels()
     with _busy("computing margins"):
-        found = local_margins(system, along, horizon=horizon)
+        found = design.local_margins(system, along, horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)
@@ -194,7 +189,6 @@ def verify_certificate(
     as_json: bool,
 ) -> int:
     """Check a certificate, against its project if one is given; 1 if it does not hold."""
-    from sealag.design import verify_design
     from sealag.passivity import read_certificate, verify
 
     if second:
@@ -207,10 +201,10 @@ def verify_certificate(
         result = verify(path, exact=exact)
     else:
         read_certificate(path)
-        system = load(project)
+        system = design.load(project)
         along = _motion(system, motion)
         compile_kernels()
-        result = verify_design(path, system, along, exact=exact)
+        result = design.verify_design(path, system, along, exact=exact)
     if as_json:
         show_json(result.to_json_dict())
     else:

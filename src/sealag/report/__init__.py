@@ -4,6 +4,7 @@ from sealag.report._mcap import McapRecorder
 from sealag.report._mcap_reader import RecordingFile, Signal, read_recording
 from sealag.report._page import Cell, Figure, Raw, Section, Table, Text, render_page
 from sealag.report._recording import write_run
+from sealag.report._summary import run_summary
 
 __all__ = [
     "Cell",
@@ -17,5 +18,6 @@ __all__ = [
     "Text",
     "read_recording",
     "render_page",
+    "run_summary",
     "write_run",
 ]
