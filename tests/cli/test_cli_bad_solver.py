@@ -142,7 +142,7 @@ def test_the_command_line_says_it_too(walk, tmp_path, monkeypatch, capsys):
     code, text = answer()
     assert code == 1
     assert "not certified because it is open whether" in text
-    assert "left open is a longer common_multiplier_delay_s: Clarabel" in text
+    assert "open whether common_multiplier_delay_s is longer: Clarabel" in text
 
 
 def test_a_forged_yes_is_found(walk):

@@ -1,4 +1,4 @@
-"""What the commands do: call one function of the library and show its answer."""
+"""Commands: each calls one function of the library and shows its answer."""
 
 import os
 import sys
@@ -37,7 +37,7 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
 
 
 def compile_kernels() -> None:
-    """Compile what is not in the cache yet, and say so: it takes minutes after an installation."""
+    """Compile kernels that are not cached, with a message: minutes, once an installation."""
     from sealag.kernels import compile_all, compiled
 
     if compiled():
@@ -51,7 +51,7 @@ def compile_kernels() -> None:
 
 @contextmanager
 def _busy(what: str) -> Iterator[None]:
-    """Say on a terminal's standard error what takes its time."""
+    """Show a spinner on standard error if it is a terminal."""
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -102,10 +102,10 @@ def certify_project(
 
 
 def _stability(certificate: Certificate) -> str:
-    """What is known of stability without delay, which a passive loop need not have."""
+    """Stability without delay, in words; a passive loop need not be stable."""
     if certificate.unstable_modes:
         count = certificate.unstable_modes
-        return f"no: {count} root{'s' * (count > 1)} without decay, already without delay"
+        return f"no: {count} unstable root{'s' * (count > 1)} without delay"
     if certificate.stable is None:
         return "not known"
     return "yes" if certificate.stable else "no"
@@ -132,17 +132,17 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         ("certificate", str(path)),
     ]
     if certificate.common_multiplier_delay_s is not None:
-        rows.insert(3, ("with one multiplier", time_text(certificate.common_multiplier_delay_s)))
+        rows.insert(3, ("one multiplier for all", time_text(certificate.common_multiplier_delay_s)))
     if certificate.time_varying_delay_s is not None:
-        rows.insert(4, ("with matrices that move", time_text(certificate.time_varying_delay_s)))
+        rows.insert(4, ("time-varying matrices", time_text(certificate.time_varying_delay_s)))
     for name, value in rows:
         print(f"{name:26} {value}")
     if certificate.status is Status.CERTIFIED and certificate.stable is not True:
-        print("passive, but not stable by itself: without other means the robot falls or drifts")
+        print("passive but not stable: without further control the robot falls or drifts")
     for reason in certificate.reasons:
         print(f"not certified because {reason}")
     for bound, reason in certificate.left_open.items():
-        print(f"left open is a longer {bound}: {reason}")
+        print(f"open whether {bound} is longer: {reason}")
     for assumption in certificate.assumptions:
         print(f"assumed: {assumption.text}")
 
@@ -170,8 +170,8 @@ def margin_project(
     print(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
     if found.frequency_rad_s is not None:
         print(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
-    print(f"{'without decay':26} {found.unstable_modes} of the roots without delay")
-    print(f"{'neutral by symmetry':26} {found.neutral} roots")
+    print(f"{'unstable roots':26} {found.unstable_modes} without delay")
+    print(f"{'zero roots of symmetries':26} {found.neutral}")
     print(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
     mode = sorted(found.mode.items(), key=lambda item: -item[1])
     print(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
@@ -193,11 +193,13 @@ def verify_certificate(
 
     if second:
         if exact or project is not None or motion is not None:
-            raise InputError("--second stands alone: it is exact and knows the file only.")
+            raise InputError(
+                "--second takes no --exact, --project or --motion: it reads the file alone."
+            )
         return _second(path, as_json=as_json)
     if project is None:
         if motion is not None:
-            raise InputError("--motion says nothing without --project.")
+            raise InputError("--motion needs --project.")
         result = verify(path, exact=exact)
     else:
         read_certificate(path)

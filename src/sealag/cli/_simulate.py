@@ -1,4 +1,4 @@
-"""`sealag simulate`: run, record, and account for the energy."""
+"""`sealag simulate`: run a scenario, write the recording, print the energy audit."""
 
 import sys
 from collections.abc import Callable
@@ -170,7 +170,7 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
 
 
 def _show_side(name: str, side: Passivity | None) -> None:
-    """What the passivity observer says about one side, if it can say anything."""
+    """Print the passivity observer's verdict on one side, if it has one."""
     if side is None:
         return
     where = ""
