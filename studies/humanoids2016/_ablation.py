@@ -2,15 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from humanoids2016._walk import WalkCase, at_delay_scale
+from humanoids2016._walk import WalkCase, at_delay_scale, walking_of
 from humanoids2016._walk_table import walk_success
 from sealag.design import load
 from sealag.typing import IntArray
-from sealag.walking import Prediction, Terrain, WalkingOptions
+from sealag.walking import Ground, Prediction, Walking
 
 PUBLISHED_LAW = "published law"
 
@@ -50,29 +51,27 @@ _SUPPLIED: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def ablation_cases(*, steps: int = 7) -> dict[str, WalkCase]:
-    """Return the default walk with each means left out, and the published law.
+def ablation_cases(walking: Walking) -> dict[str, WalkCase]:
+    """Return a walk with each means left out, and with the published law.
 
     Args:
-        steps: Number of steps.
+        walking: The walk, with all means.
     """
+    whole, options = WalkCase(walking=walking), walking.options
     cases = {
-        name: WalkCase(steps=steps, options=WalkingOptions(**change))
-        for name, change in LEFT_OUT.items()
+        name: whole.walks(options=replace(options, **change)) for name, change in LEFT_OUT.items()
     }
-    whole = cases["everything"]
-    gait = replace(whole.gait, transfer_time=1e-3)
-    cases["no weight transfer"] = replace(whole, gait=gait)
-    law = WalkingOptions.published()
-    cases[PUBLISHED_LAW] = replace(whole, options=law)
-    cases[f"{PUBLISHED_LAW}, link-side feedback"] = replace(
-        whole, options=WalkingOptions.published(feedback="joint")
+    cases["no weight transfer"] = whole.walks(gait=replace(walking.gait, transfer_time=1e-3))
+    printed = whole.walks(options=options.published())
+    cases[PUBLISHED_LAW] = printed
+    cases[f"{PUBLISHED_LAW}, link-side feedback"] = whole.walks(
+        options=options.published(feedback="joint")
     )
-    cases[f"{PUBLISHED_LAW}, no delay"] = replace(whole, options=law, delay_scale=0.0)
+    cases[f"{PUBLISHED_LAW}, no delay"] = replace(printed, delay_scale=0.0)
     return cases
 
 
-def gait_cases(*, steps: int = 7) -> dict[str, WalkCase]:
+def gait_cases(walking: Walking) -> dict[str, WalkCase]:
     """Return walks that tell what makes the walk a gait, with two spring stiffnesses.
 
     They begin with the few means that suffice not to fall (preview at constant velocity, footsteps
@@ -80,14 +79,15 @@ def gait_cases(*, steps: int = 7) -> dict[str, WalkCase]:
     placement by angular momentum, one at a time and both.
 
     Args:
-        steps: Number of steps.
+        walking: The walk.
     """
     cases = {}
     for K in (1000.0, 350.0):
         for name, supplied in _SUPPLIED.items():
             change = {key: value for key, value in _TRIAL.items() if key not in supplied}
-            cases[f"K = {K:g} Nm/rad: {name}"] = WalkCase(
-                steps=steps, spring_stiffness=K, options=WalkingOptions(**change)
+            case = WalkCase(walking=walking, spring_stiffness=K)
+            cases[f"K = {K:g} Nm/rad: {name}"] = case.walks(
+                options=replace(walking.options, **change)
             )
     return cases
 
@@ -112,17 +112,21 @@ class AblationTable:
 
 
 def ablation_table(
-    terrains: Sequence[Terrain], *, project: str = "bundled:hume", steps: int = 7, jobs: int = 1
+    grounds: Sequence[Ground],
+    *,
+    project: str = "bundled:hume",
+    most: int | None = None,
+    jobs: int = 1,
 ) -> AblationTable:
     """Leave out each means over spring stiffness, α, β and delay scale.
 
     Args:
-        terrains: the grounds.
-        project: the project file.
-        steps: number of steps.
+        grounds: the grounds.
+        project: the project file, with a [walking] section.
+        most: how many means and conditions at most; None for all.
         jobs: number of processes.
     """
-    delays = load(project).delays
+    system = load(project)
     conditions: dict[str, dict[str, float]] = {
         "K = 200": {"spring_stiffness": 200.0},
         "K = 1000": {"spring_stiffness": 1000.0},
@@ -133,19 +137,20 @@ def ablation_table(
         "no delay": {"delay_scale": 0.0},
         "delays × 2": {"delay_scale": 2.0},
     }
-    means = ablation_cases(steps=steps)
+    means = ablation_cases(walking_of(system))
     means = {name: case for name, case in means.items() if not name.startswith(f"{PUBLISHED_LAW},")}
+    means, conditions = dict(islice(means.items(), most)), dict(islice(conditions.items(), most))
     cases = {}
     for name, case in means.items():
         for condition, change in conditions.items():
-            varied = replace(case, **change)
-            cases[f"{name}, {condition}"] = at_delay_scale(varied, delays, varied.delay_scale)
-    rows = walk_success(cases, terrains, project=project, jobs=jobs)
+            varied, scale = replace(case, **change), change.get("delay_scale", 1.0)
+            cases[f"{name}, {condition}"] = at_delay_scale(varied, system.delays, scale)
+    rows = walk_success(cases, grounds, project=project, jobs=jobs)
     shape = (len(means), len(conditions))
     return AblationTable(
         means=tuple(means),
         conditions=tuple(conditions),
-        terrains=len(terrains),
+        terrains=len(grounds),
         walked=np.array([row.walked for row in rows]).reshape(shape),
         gaits=np.array([row.gaits for row in rows]).reshape(shape),
     )

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from humanoids2016._walk import WalkCase, at_delay_scale
-from humanoids2016._walk_table import WalkRow, walk_success
+from humanoids2016._walk import WalkCase, at_delay_scale, walking_of
+from humanoids2016._walk_table import rough_grounds, walk_success
 from sealag.design import System, certified_bounds, load, margin_of
 from sealag.robot import Motion
 from sealag.simulation import Push
 from sealag.typing import Array
-from sealag.walking import FlatTerrain, rough_terrain, stairs
+from sealag.walking import GroundProfile, Walking
 from sealag.whole_body import MotorAngles, StaticJoint
 
 PUSH = 0.1  # s
@@ -21,38 +21,34 @@ SCALES = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 HELD_OUT = 100  # first seed of terrains on which nothing was chosen
 
 
-def beyond_cases() -> dict[str, WalkCase]:
-    """Return walks over stairs, under pushes and over rougher ground."""
-    cases = {}
+def beyond_cases(walking: Walking) -> dict[str, WalkCase]:
+    """Return walks over stairs, under pushes and over rougher ground.
+
+    Args:
+        walking: The walk; its ground and steps are replaced.
+    """
+    case, cases = WalkCase(walking=walking), {}
     for rise in (0.05, 0.10):
-        up, down = stairs([rise] * 5), stairs([-rise] * 5)
-        cases[f"stairs, {rise * 100:.0f} cm up"] = WalkCase(steps=8, terrain=up)
-        cases[f"stairs, {rise * 100:.0f} cm down"] = WalkCase(steps=8, terrain=down)
-    cases["stairs, 3 × 10 cm up, then down"] = WalkCase(
-        steps=10, terrain=stairs([0.1] * 3 + [-0.1] * 3)
-    )
+        for way, sign in (("up", 1.0), ("down", -1.0)):
+            ground = GroundProfile.stairs([sign * rise] * 5)
+            cases[f"stairs, {rise * 100:.0f} cm {way}"] = case.walks(steps=8, ground=ground)
+    ground = GroundProfile.stairs([0.1] * 3 + [-0.1] * 3)
+    cases["stairs, 3 × 10 cm up, then down"] = case.walks(steps=10, ground=ground)
     for amplitude in (0.09, 0.12):
         name = f"rough, ± {amplitude * 100:.0f} cm, 20 steps"
-        cases[name] = WalkCase(steps=20, terrain=rough_terrain(HELD_OUT, amplitude=amplitude))
+        ground = GroundProfile.rough(HELD_OUT, amplitude=amplitude)
+        cases[name] = case.walks(steps=20, ground=ground)
     pushes = {"forward": (1.0, 0.0), "back": (-1.0, 0.0), "left": (0.0, 1.0), "right": (0.0, -1.0)}
     for force in (20.0, 60.0, 120.0):
         for name, (x, y) in pushes.items():
             push = Push(
                 frame="torso", force=(force * x, force * y, 0.0), start=PUSHED, duration=PUSH
             )
-            cases[f"push {name}, {force:.0f} N for {PUSH:g} s"] = WalkCase(
-                steps=10, terrain=FlatTerrain(), pushes=(push,)
+            pushed = replace(case, pushes=(push,))
+            cases[f"push {name}, {force:.0f} N for {PUSH:g} s"] = pushed.walks(
+                steps=10, ground=GroundProfile.flat()
             )
     return cases
-
-
-def walk_beyond(*, jobs: int = 1) -> tuple[WalkRow, ...]:
-    """Walk every case of `beyond_cases` on its own ground.
-
-    Args:
-        jobs: number of processes.
-    """
-    return walk_success(beyond_cases(), None, jobs=jobs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,12 +115,15 @@ def delay_map(
         jobs: number of processes.
     """
     system = load(project)
+    walking = walking_of(system)
     cases = {
-        f"{K:g} {scale:g}": at_delay_scale(WalkCase(spring_stiffness=K), system.delays, scale)
+        f"{K:g} {scale:g}": at_delay_scale(
+            WalkCase(walking=walking, spring_stiffness=K), system.delays, scale
+        )
         for K in stiffnesses
         for scale in scales
     }
-    grounds = [rough_terrain(HELD_OUT + k) for k in range(terrains)]
+    grounds = rough_grounds(terrains, first=HELD_OUT)
     rows = walk_success(cases, grounds, project=project, jobs=jobs)
     shape = (len(stiffnesses), len(scales))
     bounds = np.array([_bounds(system, motion, K) for K in stiffnesses])

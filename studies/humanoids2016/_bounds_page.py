@@ -1,30 +1,21 @@
 """The parts of the paper's page that compare the walk with bounds, Fig. 5 and future work."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from humanoids2016._beyond import DelayMap
-from humanoids2016._figure4 import Figure4
 from humanoids2016._figure5 import TorqueTrace
+from humanoids2016._findings import Findings
+from humanoids2016._page import Cell, Figure, Section, Table, Text
 from humanoids2016._plots import plot_delay_map, plot_figure_4, plot_torques
 from humanoids2016._walk_page import rows_table
-from humanoids2016._walk_table import WalkRow
-from sealag.passivity import Certificate
-from sealag.report import Cell, Figure, Section, Table, Text
 
 
-def limits_section(
-    planned: Figure4, simulated: Figure4, rows: Sequence[WalkRow], delays: DelayMap
-) -> Section:
+def limits_section(found: Findings) -> Section:
     """Compare bounds over the planned and the simulated walk, and both with what walks.
 
     Args:
-        planned: Fig. 4 over the plan.
-        simulated: Fig. 4 over the walk as simulated.
-        rows: success over spring stiffness, α and β.
-        delays: how much delay is walked.
+        found: what the study computed.
     """
+    planned, simulated, delays = found.figure, found.simulated, found.delays
     unit = int(np.argmin(np.abs(planned.alpha - 1.0)))
 
     def ms(value: float) -> Cell:
@@ -91,18 +82,18 @@ def limits_section(
                 caption="Largest d_1 up to which every ground was walked.",
             ),
             Text(text="Over spring stiffness, α and β at the paper's delays:"),
-            rows_table(rows),
+            rows_table(found.gains),
         ],
     )  # fmt: skip
 
 
-def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Section:
+def figure_5_section(found: Findings) -> Section:
     """Show Fig. 5.
 
     Args:
-        traces: walks with several β.
-        joints: names.
+        found: what the study computed.
     """
+    traces, joints = found.traces, found.system.robot.joints
     shown = [t for t in traces if t.damping_scale == 1.0 and t.stiffness == traces[0].stiffness]
     rows = [
         [
@@ -113,7 +104,7 @@ def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Se
             _if_walked(t, f"{t.raw_deviation.mean():.0f}"),
             _if_walked(t, f"{t.command_lag * 1e3:.1f}"),
             _if_walked(t, f"{t.torque_lag * 1e3:.1f}"),
-            t.walk.cause,
+            t.walk.gait.cause,
         ]
         for t in traces
     ]
@@ -149,16 +140,16 @@ def figure_5_section(traces: Sequence[TorqueTrace], joints: Sequence[str]) -> Se
 
 
 def _if_walked(trace: TorqueTrace, text: str) -> Cell:
-    return Cell(text=text if trace.walk.walked else "–", css="number")
+    return Cell(text=text if trace.walk.gait.walked else "–", css="number")
 
 
-def beyond_section(rows: Sequence[WalkRow], certificate: Certificate) -> Section:
+def beyond_section(found: Findings) -> Section:
     """Show walks beyond the paper, and what became of its future work.
 
     Args:
-        rows: stairs, pushes and rougher ground.
-        certificate: over the planned walk, with the bound for matrices that vary in time.
+        found: what the study computed.
     """
+    certificate = found.certificate
 
     def ms(value: float | None) -> str:
         return "nothing" if value is None else f"{value * 1e3:.2f} ms"
@@ -167,7 +158,7 @@ def beyond_section(rows: Sequence[WalkRow], certificate: Certificate) -> Section
         anchor="beyond",
         title="Beyond the paper",
         blocks=[
-            rows_table(rows),
+            rows_table(found.beyond),
             Table(
                 columns=["Future work", "Here"],
                 rows=[

@@ -98,17 +98,17 @@ class Figure4:
     certified: tuple[CertifiedVariant, ...]
 
 
-def figure_4(robot: Robot, motion: Motion, *, system: System) -> Figure4:
+def figure_4(system: System, motion: Motion) -> Figure4:
     """Compute Fig. 4 over every instant of a walk.
 
     Args:
-        robot: Hume.
+        system: Hume with the paper's gains.
         motion: the planned (or simulated) walk, one foot standing at a time.
-        system: the paper's gains.
 
     Returns:
         Bounds of the published criterion over α and D_θ[0], and of the certified one.
     """
+    robot = system.robot
     printed = replace(
         system,
         law=replace(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from humanoids2016._claims import Claim, Verdict
-from humanoids2016._walk import TICK, Walk, WalkCase, simulate_walk
+from humanoids2016._walk import TICK, Walk, WalkCase, simulate_walk, walking_of
 from sealag.design import load
 from sealag.typing import Array
 
@@ -73,10 +73,16 @@ def figure_5(
 
 def _trace(project: str, stiffness: float, scale: float, beta: float) -> TorqueTrace:
     system = load(project)
-    case = WalkCase(inertia_shaping=beta, damping_scale=scale, spring_stiffness=stiffness)
+    case = WalkCase(
+        walking=walking_of(system),
+        inertia_shaping=beta,
+        damping_scale=scale,
+        spring_stiffness=stiffness,
+    )
     walk = simulate_walk(system, case)
     run = walk.run
-    late = run.time > (walk.touchdown[1] if len(walk.touchdown) > 1 else 0.0)
+    first = walk.gait.touchdown[1] if walk.gait.steps else 0.0
+    late = run.time > first
     asked = _task_torque(walk, run.time - run.command_age)
     sent = _task_torque(walk, run.time)
     channel = 0.5 * (system.delays.central.at(run.time) + system.delays.embedded.at(run.time))
@@ -137,7 +143,7 @@ def figure_5_claims(traces: Sequence[TorqueTrace]) -> tuple[Claim, ...]:
     """
     groups: dict[tuple[float, float], list[TorqueTrace]] = {}
     for trace in traces:
-        if trace.walk.walked:
+        if trace.walk.gait.walked:
             groups.setdefault((trace.stiffness, trace.damping_scale), []).append(trace)
     means = {key: [float(t.deviation.mean()) for t in group] for key, group in groups.items()}
     rising = [step > 0.0 for values in means.values() for step in np.diff(values)]
@@ -152,9 +158,11 @@ def figure_5_claims(traces: Sequence[TorqueTrace]) -> tuple[Claim, ...]:
         for (K, alpha), values in means.items()
         if values[-1] > VISIBLE * values[0]
     ]
-    full = [t for t in traces if t.damping_scale == 1.0 and t.walk.walked]
+    full = [t for t in traces if t.damping_scale == 1.0 and t.walk.gait.walked]
     raw = np.array([t.raw_deviation.mean() for t in full])
-    soft = {(t.stiffness, t.beta): t for t in traces if t.damping_scale < 1.0 and t.walk.walked}
+    soft = {
+        (t.stiffness, t.beta): t for t in traces if t.damping_scale < 1.0 and t.walk.gait.walked
+    }
     pairs = [(t, soft[t.stiffness, t.beta]) for t in full if (t.stiffness, t.beta) in soft]
     return (
         Claim(

@@ -7,14 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
+from humanoids2016._bounds_page import beyond_section, figure_5_section, limits_section
 from humanoids2016._claims import Claim
 from humanoids2016._figure4 import Figure4
 from humanoids2016._figure5 import TorqueTrace
+from humanoids2016._findings import Findings
+from humanoids2016._page import Cell, Figure, Section, Table, Text, render_page
 from humanoids2016._plots import plot_figure_4, plot_walk_bounds
 from humanoids2016._random_table import RandomPlantTable
 from humanoids2016._unsafe import UnsafeExample
+from humanoids2016._walk_page import energy_section, means_section, walk_section
 from sealag.files import write_text
-from sealag.report import Cell, Figure, Section, Table, Text, render_page
 
 TORQUE_STRIDE = 2
 """Every how many logged instants of Fig. 5 are written."""
@@ -22,30 +25,13 @@ TORQUE_STRIDE = 2
 TITLE = "Passivity of time-delayed whole-body control with series elastic actuation, recomputed"
 
 
-def write_paper_page(
-    out: Path,
-    figure: Figure4,
-    claims: Sequence[Claim],
-    *,
-    unsafe: Sequence[UnsafeExample],
-    table: RandomPlantTable,
-    simulated: Figure4,
-    traces: Sequence[TorqueTrace],
-    extra: Sequence[Section] = (),
-    version: str,
-) -> Path:
+def write_paper_page(out: Path, found: Findings, *, version: str) -> Path:
     """Write the page and its CSV files.
 
     Args:
         out: folder for `index.html`, `figure4.csv`, `figure4_instants.csv`, both again for the
             simulated walk, `figure5.csv`, and `tables/` with every table of the page.
-        figure: the computed Fig. 4.
-        claims: statements of the paper, checked.
-        unsafe: plants on which the published criterion is unsafe.
-        table: the random plants.
-        simulated: Fig. 4 over the simulated walk.
-        traces: the walks of Fig. 5.
-        extra: further parts, such as the simulated walk and Fig. 5.
+        found: what the study computed.
         version: of sealag, for the footer.
 
     Returns:
@@ -54,35 +40,66 @@ def write_paper_page(
     Raises:
         FileError: a file cannot be written.
     """
-    for name, computed in (("figure4", figure), ("figure4_simulated", simulated)):
+    for name, computed in (("figure4", found.figure), ("figure4_simulated", found.simulated)):
         write_text(out / f"{name}.csv", _figure_csv(computed))
         write_text(out / f"{name}_instants.csv", _instants_csv(computed))
-    write_text(out / "figure5.csv", _torques_csv(traces))
+    write_text(out / "figure5.csv", _torques_csv(found.traces))
     sections = [
-        Section(anchor="claims", title="What the paper says", blocks=[_claims_table(claims)]),
-        Section(anchor="figure4", title="Fig. 4: largest delay", blocks=_figure_blocks(figure)),
-        Section(anchor="certified", title="Certified criterion", blocks=_certified_blocks(figure)),
-        Section(
-            anchor="unsafe", title="Where (29) is unsafe", blocks=_unsafe_blocks(unsafe, table)
-        ),
-        *extra,
+        _claims_section(found.claims),
+        *_criteria_sections(found),
+        walk_section(found),
+        means_section(found),
+        energy_section(found),
+        limits_section(found),
+        figure_5_section(found),
+        beyond_section(found),
     ]
-    lead = (
-        "Zhao and Sentis (Humanoids 2016) bound the delay that a whole-body controller of a robot "
-        "with springs in its joints tolerates. Here their Fig. 4 is computed over every "
-        f"millisecond of a planned 7-step walk of Hume ({len(figure.time)} instants), their "
-        "statements are checked, and a corrected criterion stands beside theirs."
-    )
     for name, content in _tables_csv(sections):
         write_text(out / "tables" / f"{name}.csv", content)
     page = render_page(
         TITLE,
-        lead,
+        _lead(found),
         sections,
-        footer=f"Computed by sealag {version}; numbers also in the CSV files beside this page.",
+        footer=f"Computed by sealag {version}. The CSV files beside this page hold the numbers.",
     )
     write_text(out / "index.html", page)
     return out / "index.html"
+
+
+def _lead(found: Findings) -> str:
+    """What the page is about."""
+    steps, instants = found.walk.case.walking.steps, len(found.figure.time)
+    return (
+        "Zhao and Sentis (Humanoids 2016) bound the delay that a whole-body controller of a robot "
+        "with series elastic actuators tolerates. This page computes their Fig. 4 over "
+        f"{instants} instants of a planned {steps}-step walk of Hume, checks their statements, "
+        "and puts a corrected criterion beside theirs."
+    )
+
+
+def _claims_section(claims: Sequence[Claim]) -> Section:
+    return Section(anchor="claims", title="What the paper says", blocks=[_claims_table(claims)])
+
+
+def _criteria_sections(found: Findings) -> list[Section]:
+    """Fig. 4, the certified criterion, and where the published one is unsafe."""
+    return [
+        Section(
+            anchor="figure4",
+            title="Fig. 4: largest delay",
+            blocks=_figure_blocks(found.figure),
+        ),
+        Section(
+            anchor="certified",
+            title="Certified criterion",
+            blocks=_certified_blocks(found.figure),
+        ),
+        Section(
+            anchor="unsafe",
+            title="Where (29) is unsafe",
+            blocks=_unsafe_blocks(found.unsafe, found.table),
+        ),
+    ]
 
 
 def _claims_table(claims: Sequence[Claim]) -> Table:

@@ -119,18 +119,19 @@ def plot_gait(walk: Walk) -> str:
     Returns:
         SVG markup.
     """
-    gait = walk.case.gait
+    gait, plan = walk.gait, walk.case.walking.gait
     with _drawing(7.2, 3.6) as (drawing, axes):
-        widths = np.arange(1, len(walk.step_width) + 1)
-        for colour, x, y, plan, share, label in (
-            (COLOURS[0], walk.apex_step, walk.apex_speed, gait.apex_speed, 0.2, "apex speed (m/s)"),
-            (COLOURS[1], widths, walk.step_width, gait.step_width, 0.25, "step width (m)"),
+        widths = np.arange(1, gait.steps + 1)
+        for colour, x, y, planned, share, label in (
+            (COLOURS[0], gait.apex_step, gait.apex_speed, plan.apex_speed, 0.2, "apex speed (m/s)"),
+            (COLOURS[1], widths, gait.step_width, plan.step_width, 0.25, "step width (m)"),
         ):
             axes.plot(x, y, "o-", color=colour, label=label)
-            axes.axhline(plan, ls="--", color=colour, lw=1)
-            axes.axhspan(plan * (1 - share), plan * (1 + share), color=colour, alpha=0.1, lw=0)
+            axes.axhline(planned, ls="--", color=colour, lw=1)
+            low, high = planned * (1 - share), planned * (1 + share)
+            axes.axhspan(low, high, color=colour, alpha=0.1, lw=0)
         axes.set_xlabel("step")
-        axes.set_ylim(0.0, 1.4 * gait.apex_speed)
+        axes.set_ylim(0.0, 1.4 * plan.apex_speed)
         axes.legend(frameon=False, ncols=2, fontsize=10)
         return _svg(drawing)
 

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from humanoids2016._random_plants import SeaPlant, random_sea_plant
 from sealag.errors import SolverError
-from sealag.margin import SeaPlant, delay_margin, random_sea_plant
+from sealag.margin import delay_margin
 from sealag.passivity import max_delay, max_delay_from_stiffness
 
 

@@ -5,35 +5,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from humanoids2016._ablation import PUBLISHED_LAW, AblationTable
+from humanoids2016._ablation import PUBLISHED_LAW
+from humanoids2016._findings import Findings
+from humanoids2016._page import Cell, Figure, Raw, Section, Table, Text
 from humanoids2016._plots import plot_gait
 from humanoids2016._walk import Walk
 from humanoids2016._walk_table import WalkRow
 from sealag.delay import RoundTrip
-from sealag.design import System
-from sealag.passivity import Certificate
-from sealag.report import Cell, Figure, Raw, Section, Table, Text
 from sealag.robot import Robot
 from sealag.typing import Array
 
 FRAMES_PER_SECOND = 30.0
 
 
-def walk_section(
-    system: System,
-    walk: Walk,
-    robust: Sequence[WalkRow],
-    held_out: Sequence[WalkRow],
-) -> Section:
+def walk_section(found: Findings) -> Section:
     """Show the walk: playback, gait against plan, success with errors.
 
     Args:
-        system: Hume with the paper's gains and delays.
-        walk: the 7-step walk at the paper's delays.
-        robust: success over random terrains.
-        held_out: success over 20 steps on terrains that were not looked at before.
+        found: what the study computed.
     """
-    gait = walk.case.gait
+    system, walk, held_out = found.system, found.walk, found.held_out
+    walking, gait = walk.case.walking, walk.gait
+    plan = walking.gait
     springs, damping = system.actuators.spring_stiffness, system.actuators.motor_damping
     return Section(
         anchor="walk",
@@ -44,12 +37,12 @@ def walk_section(
                     f"Hume walks on the simulator: springs of {_span(springs)} Nm/rad, D_θ of "
                     f"{_span(damping)} Nms/rad, T_H of {_delay(system.delays.central)} and T_L of "
                     f"{_delay(system.delays.embedded)}, unilateral contact with friction "
-                    f"{walk.case.friction:g} and plastic impacts. No external wrench and no "
+                    f"{walking.friction:g} and plastic impacts. No external wrench and no "
                     "prescribed base motion. It took "
-                    f"{walk.steps} steps ({walk.cause}); after the second step its apex speeds "
-                    f"stay within {walk.speed_deviation:.0%} of the planned "
-                    f"{gait.apex_speed:g} m/s and its step widths within "
-                    f"{walk.width_deviation:.0%} of {gait.step_width:g} m."
+                    f"{gait.steps} steps ({gait.cause}); after the second step its apex speeds "
+                    f"stay within {gait.speed_deviation:.0%} of the planned "
+                    f"{plan.apex_speed:g} m/s and its step widths within "
+                    f"{gait.width_deviation:.0%} of {plan.step_width:g} m."
                 )
             ),
             Raw(
@@ -64,12 +57,12 @@ def walk_section(
             ),
             Text(
                 text=(
-                    f"Over random terrains of ± 5 cm, {walk.case.steps} steps each; a gait has "
+                    f"Over random terrains of ± 5 cm, {walking.steps} steps each; a gait has "
                     "apex speeds within 20 % and step widths within 25 % of the plan after the "
                     "second step."
                 )
             ),
-            rows_table(robust),
+            rows_table(found.robust),
             Text(
                 text=(
                     "Gains and gait were chosen while looking at some of these grounds. On grounds "
@@ -90,15 +83,16 @@ def _delay(trip: RoundTrip) -> str:
     return f"{trip.mean * 1e3:g} ms in the mean and {trip.upper_bound * 1e3:g} ms at most"
 
 
-def _why_it_falls(walk: Walk, damping: Array, ablations: Sequence[WalkRow]) -> str:
-    """How the published law fares, and what its damping would drag in the walk that walks."""
-    run, n = walk.run, len(walk.run.joints)
+def _why_it_falls(found: Findings) -> str:
+    """How the published law fares, and the torque that its damping takes in the walk above."""
+    run, damping = found.walk.run, found.system.actuators.motor_damping
+    speeds = found.system.robot.joint_velocities(run.v)
     knee = next(k for k, name in enumerate(run.joints) if "knee" in name)
-    rate = float(np.sqrt(np.mean(run.v[:, run.v.shape[1] - n + knee] ** 2)))
+    rate = float(np.sqrt(np.mean(speeds[:, knee] ** 2)))
     carried = float(np.sqrt(np.mean(run.tau_sea[:, knee] ** 2)))
     printed = "; ".join(
         f"{row.name}: {row.walked} of {row.terrains} walk, {row.mean_steps:.1f} steps in the mean"
-        for row in ablations
+        for row in found.ablations
         if row.name.startswith(PUBLISHED_LAW)
     )
     return (
@@ -110,22 +104,13 @@ def _why_it_falls(walk: Walk, damping: Array, ablations: Sequence[WalkRow]) -> s
     )
 
 
-def means_section(
-    system: System,
-    walk: Walk,
-    ablations: Sequence[WalkRow],
-    everywhere: AblationTable,
-    gait: Sequence[WalkRow],
-) -> Section:
+def means_section(found: Findings) -> Section:
     """Show what each of the walking controller's means is worth.
 
     Args:
-        system: Hume with the paper's gains and delays.
-        walk: the 7-step walk.
-        ablations: success with each means left out.
-        everywhere: the same over spring stiffness, α, β and delays.
-        gait: what makes the walk a gait.
+        found: what the study computed.
     """
+    everywhere, ablations, gait = found.everywhere, found.ablations, found.gait
     cells = [
         [
             name,
@@ -150,7 +135,7 @@ def means_section(
                 )
             ),
             rows_table(ablations),
-            Text(text=_why_it_falls(walk, system.actuators.motor_damping, ablations)),
+            Text(text=_why_it_falls(found)),
             Table(
                 columns=["Left out", *everywhere.conditions],
                 rows=cells,
@@ -173,14 +158,13 @@ def means_section(
     )
 
 
-def energy_section(walk: Walk, certificate: Certificate) -> Section:
+def energy_section(found: Findings) -> Section:
     """Show the walk's energy audit, and the passivity observer beside the certificate.
 
     Args:
-        walk: the walk.
-        certificate: of the position loop over the planned walk.
+        found: what the study computed.
     """
-    audit = walk.run.audit
+    audit, certificate = found.walk.run.audit, found.certificate
     flows, works = audit.joint_flows, audit.scalar_flows
     drive = (flows["command"] - flows["damping"]).sum(axis=1)
     observed = audit.joint_side
@@ -298,7 +282,7 @@ def playback(robot: Robot, walk: Walk) -> str:
             }
         )
     xs = np.arange(frames[0]["base"][0] - 1.2, frames[-1]["base"][0] + 1.4, 0.05)
-    ground = [[round(float(x), 3), round(walk.case.terrain.height(x, 0.0), 3)] for x in xs]
+    ground = [[round(float(x), 3), round(walk.case.walking.ground.height(x, 0.0), 3)] for x in xs]
     data = {"rate": FRAMES_PER_SECOND, "terrain": ground, "frames": frames}
     environment = jinja2.Environment(loader=jinja2.PackageLoader("humanoids2016"), autoescape=True)
     template = environment.get_template("playback.html")

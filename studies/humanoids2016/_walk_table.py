@@ -11,7 +11,7 @@ from humanoids2016._walk import Walk, WalkCase, at_delay_scale, simulate_walk
 from humanoids2016._walk_errors import SensorNoise
 from sealag.delay import Delays
 from sealag.design import System, load
-from sealag.walking import Terrain, rough_terrain
+from sealag.walking import Ground, GroundProfile, Walking
 
 ENOUGH = 0.95
 """Share of terrains that must be walked."""
@@ -55,43 +55,44 @@ class WalkRow:
             name: What was varied.
             walks: The walks.
         """
-        upright = [walk for walk in walks if walk.walked]
-        speeds = [v for w in walks for v in w.apex_speed[w.apex_step >= 2].tolist()]
-        widths = [v for w in walks for v in w.step_width[2:].tolist()]
+        gaits = [walk.gait for walk in walks]
+        upright = [gait for gait in gaits if gait.walked]
+        speeds = [speed for gait in gaits for speed in gait.settled_speed.tolist()]
+        widths = [width for gait in gaits for width in gait.settled_width.tolist()]
         return cls(
             name=name,
             terrains=len(walks),
-            steps=walks[0].case.steps,
+            steps=walks[0].case.walking.steps,
             walked=len(upright),
-            gaits=sum(walk.is_gait for walk in walks),
+            gaits=sum(gait.is_gait for gait in gaits),
             apex_speed=float(np.mean(speeds)) if speeds else float("nan"),
             step_width=float(np.mean(widths)) if widths else float("nan"),
-            speed_deviation=max((walk.speed_deviation for walk in upright), default=float("nan")),
-            width_deviation=max((walk.width_deviation for walk in upright), default=float("nan")),
-            mean_steps=float(np.mean([walk.steps for walk in walks])),
-            causes=tuple(walk.cause for walk in walks if not walk.walked),
+            speed_deviation=max((gait.speed_deviation for gait in upright), default=float("nan")),
+            width_deviation=max((gait.width_deviation for gait in upright), default=float("nan")),
+            mean_steps=float(np.mean([gait.steps for gait in gaits])),
+            causes=tuple(gait.cause for gait in gaits if not gait.walked),
         )
 
 
 def walk_success(
     cases: Mapping[str, WalkCase],
-    terrains: Sequence[Terrain] | None,
+    grounds: Sequence[Ground] | None,
     *,
     project: str = "bundled:hume",
     jobs: int = 1,
 ) -> tuple[WalkRow, ...]:
-    """Walk every case over every terrain; the terrain's number is the seed of its errors.
+    """Walk every case over every ground; the ground's number is the seed of its errors.
 
     Args:
-        cases: What to vary; each case's own terrain and seed are replaced.
-        terrains: The grounds; None walks each case once, on its own.
+        cases: What to vary; each case's own ground and seed are replaced.
+        grounds: The grounds; None walks each case once, on its own.
         project: The project file; each process loads it.
         jobs: Number of processes.
     """
     work = [
-        (project, case if terrain is None else replace(case, terrain=terrain, seed=seed))
+        (project, case if ground is None else replace(case, seed=seed).walks(ground=ground))
         for case in cases.values()
-        for seed, terrain in enumerate([None] if terrains is None else terrains)
+        for seed, ground in enumerate([None] if grounds is None else grounds)
     ]
     walks: list[Any]
     if jobs == 1:
@@ -101,7 +102,7 @@ def walk_success(
         from joblib import Parallel, delayed
 
         walks = list(Parallel(n_jobs=jobs)(delayed(_walk)(*item) for item in work))
-    count = 1 if terrains is None else len(terrains)
+    count = 1 if grounds is None else len(grounds)
     rows = zip(cases, range(0, len(work), count))
     return tuple(WalkRow.of(name, walks[at : at + count]) for name, at in rows)
 
@@ -118,7 +119,8 @@ def _walk(project: str, case: WalkCase) -> Walk:
 def _summary(walk: Walk) -> Walk:
     """Drop what a table does not need, so that processes exchange little."""
     empty = np.zeros((0, 3))
-    return replace(walk, run=replace(_emptied(walk.run), events=()), com=empty, task=empty)
+    run = replace(_emptied(walk.run), events=())
+    return replace(walk, run=run, gait=replace(walk.gait, com=empty), task=empty)
 
 
 def _emptied(value: Any) -> Any:
@@ -133,9 +135,9 @@ def _emptied(value: Any) -> Any:
     return value
 
 
-def rough_terrains(
+def rough_grounds(
     count: int = 20, *, first: int = 0, amplitude: float = 0.05
-) -> tuple[Terrain, ...]:
+) -> tuple[Ground, ...]:
     """Return random rough grounds.
 
     Args:
@@ -143,16 +145,16 @@ def rough_terrains(
         first: Seed of the first; gains and gait were chosen on seeds below 20.
         amplitude: Their heights lie in ± this, m.
     """
-    return tuple(rough_terrain(first + k, amplitude=amplitude) for k in range(count))
+    return tuple(GroundProfile.rough(first + k, amplitude=amplitude) for k in range(count))
 
 
-def robustness_cases(*, steps: int = 20) -> dict[str, WalkCase]:
-    """Return the default walk with ideal and with ordinary sensors and models.
+def robustness_cases(walking: Walking) -> dict[str, WalkCase]:
+    """Return a walk with ideal and with ordinary sensors and models.
 
     Args:
-        steps: Number of steps.
+        walking: The walk.
     """
-    case = WalkCase(steps=steps)
+    case = WalkCase(walking=walking)
     noise = SensorNoise()
     return {
         "ideal sensors, exact model": case,
@@ -162,14 +164,14 @@ def robustness_cases(*, steps: int = 20) -> dict[str, WalkCase]:
     }
 
 
-def gain_cases(delays: Delays, *, steps: int = 7) -> dict[str, WalkCase]:
-    """Return the default walk over spring stiffness, α and β.
+def gain_cases(walking: Walking, delays: Delays) -> dict[str, WalkCase]:
+    """Return a walk over spring stiffness, α and β.
 
     Args:
+        walking: The walk.
         delays: The project's.
-        steps: Number of steps.
     """
-    case = WalkCase(steps=steps)
+    case = WalkCase(walking=walking)
     cases = {}
     for K in (200.0, 350.0, 700.0, 1000.0, 3000.0):
         cases[f"K = {K:g} Nm/rad"] = replace(case, spring_stiffness=K)

@@ -7,7 +7,8 @@ from helpers.controllers import JointPD
 from sealag.actuation import actuators
 from sealag.errors import InputError
 from sealag.robot import Contact, ContactKind, load_robot
-from sealag.simulation import Clock, FlatGround, Foot, Outcome, Push, Scene, closed_loop
+from sealag.simulation import Clock, Foot, Outcome, Push, Scene, closed_loop
+from sealag.walking import GroundProfile
 
 
 class Slope:
@@ -83,7 +84,7 @@ def test_a_slope_s_own_normal_is_that_of_its_heights(hume):
 
 
 def test_a_level_ground_is_a_slope_that_does_not_rise(hume):
-    flat, high = _run(hume, FlatGround(level=2.0), 0.5), _run(hume, Slope(0.0), 0.5)
+    flat, high = _run(hume, GroundProfile.flat(2.0), 0.5), _run(hume, Slope(0.0), 0.5)
     down = np.zeros(flat.q.shape[1])
     down[2] = 2.0
     np.testing.assert_allclose(flat.q - down, high.q, atol=1e-7)

@@ -5,21 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from humanoids2016._walk import FEET, WalkCase, simulate_walk
-from humanoids2016._walk_errors import NoisySensors, SensorNoise, wrong_robot
+from humanoids2016 import NoisySensors, SensorNoise, WalkCase, simulate_walk, wrong_robot
 from sealag.design import load
 from sealag.errors import InputError
-from sealag.kernels import walking
+from sealag.kernels import walking as kernel
 from sealag.simulation import Outcome
-from sealag.walking import (
-    FlatTerrain,
-    WalkingController,
-    WalkingGait,
-    WalkingOptions,
-    periodic_gait,
-    rough_terrain,
-    walking_start,
-)
+from sealag.walking import GroundProfile, WalkingGait, WalkingOptions, begin_walk
 from sealag.whole_body import Measurement
 
 
@@ -33,23 +24,25 @@ def hume():
 def test_periodic_gait_is_periodic(change):
     """From the apex to the apex over the next foot: same speed, mirrored place."""
     gait = WalkingGait(**change)
-    plan = periodic_gait(gait)
+    plan = gait.periodic()
     height = np.array([gait.com_height, 0, 0, 0, 0, 0.0])
     old, new = np.array([-1.0, 0.0, 0.0]), np.zeros(3)
     x, v = np.array([0.0, plan.apex_outward]), np.array([gait.apex_speed, 0.0])
     middle = 0.5 * (gait.step_time + gait.transfer_time)
     T, d = gait.step_time, gait.transfer_time
-    walking.pendulum(x, v, middle, T, d, old, new, height, 0.0, 4000)
+    kernel.pendulum(x, v, middle, T, d, old, new, height, 0.0, 4000)
     foot = np.array([plan.step_length, gait.step_width, 0.0])
-    walking.pendulum(x, v, 0.0, middle, d, new, foot, height, 0.0, 4000)
+    kernel.pendulum(x, v, 0.0, middle, d, new, foot, height, 0.0, 4000)
     np.testing.assert_allclose(x, [foot[0], foot[1] - plan.apex_outward], atol=1e-5)
     np.testing.assert_allclose(v, [gait.apex_speed, 0.0], atol=1e-5)
 
 
 def test_start_is_the_apex(hume):
     """Feet, CoM, speed and vertical angular momentum of the first state."""
-    gait, robot = WalkingGait(), hume.robot
-    q, v = walking_start(robot, FlatTerrain(level=0.1), gait=gait)
+    walking, robot = replace(hume.walking, ground=GroundProfile.flat(0.1)), hume.robot
+    gait, start = walking.gait, begin_walk(robot, hume.actuators, walking)
+    q, v = start.q, start.v
+    np.testing.assert_allclose(start.theta_dot, v[-robot.n :])
     at = robot.workspace()
     at.update(q, v)
     np.testing.assert_allclose(at.com, [0.0, 0.0, 0.1 + gait.com_height], atol=1e-9)
@@ -58,7 +51,7 @@ def test_start_is_the_apex(hume):
     np.testing.assert_allclose(at.frame_velocity("right_foot")[:3], 0.0, atol=1e-9)
     assert (at.centroidal_map() @ v)[5] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(InputError, match="com_height"):
-        walking_start(robot, FlatTerrain(), gait=replace(gait, com_height=1.2))
+        begin_walk(robot, hume.actuators, replace(walking, gait=replace(gait, com_height=1.2)))
 
 
 def test_refusals(hume):
@@ -73,7 +66,7 @@ def test_refusals(hume):
         WalkingOptions(lead_time=0.0)
     with pytest.raises(ValueError, match="static_joint_tank"):
         WalkingOptions(feedback="static_joint_tank")
-    controller = WalkingController(hume.robot, hume.actuators, FlatTerrain())
+    controller = begin_walk(hume.robot, hume.actuators, hume.walking).controller
     robot = hume.robot
     both = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n, contacts=2)
     both.contact[:] = 1.0
@@ -83,11 +76,10 @@ def test_refusals(hume):
 
 def test_walks_rough_ground_under_delay(hume):
     """Seven steps over ±5 cm with the paper's delays, noise and 5 % errors: a gait."""
-    walk = simulate_walk(
-        hume,
-        WalkCase(terrain=rough_terrain(0), noise=SensorNoise(), model_error=0.05, steps=7),
-    )
-    assert walk.is_gait, (walk.cause, walk.speed_deviation, walk.width_deviation)
+    rough = replace(hume.walking, ground=GroundProfile.rough(0), steps=7)
+    walk = simulate_walk(hume, WalkCase(walking=rough, noise=SensorNoise(), model_error=0.05))
+    gait = walk.gait
+    assert gait.is_gait, (gait.cause, gait.speed_deviation, gait.width_deviation)
     assert walk.run.measurement_age.max() > 9e-3
     assert (walk.run.contact_force[:, :, 2] >= -1e-6).all()
 
@@ -95,7 +87,7 @@ def test_walks_rough_ground_under_delay(hume):
 @pytest.mark.parametrize(
     ("options", "falls"),
     [
-        (WalkingOptions.published(), True),
+        (WalkingOptions().published(), True),
         (WalkingOptions(prediction="none"), True),
         (WalkingOptions(lead=False), False),
     ],
@@ -103,22 +95,24 @@ def test_walks_rough_ground_under_delay(hume):
 def test_no_gait_without_the_means(hume, options, falls):
     """Negative control: the published law, and ours without prediction, fall; without lead there is
     no gait, and whether it falls within eight steps hangs on the last digits."""
-    walk = simulate_walk(hume, WalkCase(terrain=rough_terrain(0), options=options, steps=8))
+    rough = replace(hume.walking, ground=GroundProfile.rough(0), options=options, steps=8)
+    walk = simulate_walk(hume, WalkCase(walking=rough))
     assert walk.run.outcome is Outcome.FELL or not falls
-    assert not walk.is_gait
+    assert not walk.gait.is_gait
 
 
 def test_too_short_a_walk_is_no_gait(hume):
     """Two steps say nothing about a gait; three do."""
-    walk = simulate_walk(hume, WalkCase(terrain=FlatTerrain(), steps=3))
-    assert walk.is_gait
-    early = walk.apex_step < 2
+    three = replace(hume.walking, ground=GroundProfile.flat(), steps=3)
+    gait = simulate_walk(hume, WalkCase(walking=three)).gait
+    assert gait.is_gait
+    early = gait.apex_step < 2
     cut = replace(
-        walk,
-        case=replace(walk.case, steps=2),
-        step_width=walk.step_width[:2],
-        apex_speed=walk.apex_speed[early],
-        apex_step=walk.apex_step[early],
+        gait,
+        walking=replace(three, steps=2),
+        step_width=gait.step_width[:2],
+        apex_speed=gait.apex_speed[early],
+        apex_step=gait.apex_step[early],
     )
     assert cut.walked
     assert np.isnan([cut.speed_deviation, cut.width_deviation]).all()
@@ -127,11 +121,10 @@ def test_too_short_a_walk_is_no_gait(hume):
 
 def test_gait_needs_the_angular_momentum(hume):
     """Negative control of the gait's measures: footsteps by the CoM's velocity are too narrow."""
-    case = WalkCase(terrain=FlatTerrain(), steps=6)
-    good = simulate_walk(hume, case)
-    poor = simulate_walk(
-        hume, replace(case, options=WalkingOptions(momentum_placement=False, bias_gain=0.0))
-    )
+    case = WalkCase(walking=replace(hume.walking, ground=GroundProfile.flat(), steps=6))
+    options = WalkingOptions(momentum_placement=False, bias_gain=0.0)
+    good = simulate_walk(hume, case).gait
+    poor = simulate_walk(hume, case.walks(options=options)).gait
     assert good.is_gait
     assert poor.width_deviation > 1.3 * good.width_deviation
 
@@ -166,7 +159,7 @@ def test_wrong_robot_is_wrong_by_as_much(hume):
     assert 0.95 < ratio < 1.05
     assert ratio != pytest.approx(1.0, abs=1e-4)
     q = hume.robot.neutral()
-    for foot in FEET:
+    for foot in hume.walking.feet:
         np.testing.assert_allclose(
             wrong.frame_placement(foot, q)[1], hume.robot.frame_placement(foot, q)[1]
         )

@@ -13,10 +13,9 @@ from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
 from sealag.design._project import load, parse_project, resolve_project
 from sealag.design._recheck import verify_design
-from sealag.design._simulate import scenario_duration, simulate, walk_scene
+from sealag.design._simulate import scenario_duration, simulate
 from sealag.design._starter import starter_project
 from sealag.design._system import Source, System
-from sealag.design._walking import Walking
 
 __all__ = [
     "ASYMMETRY_TOLERANCE",
@@ -25,7 +24,6 @@ __all__ = [
     "LocalMargins",
     "Source",
     "System",
-    "Walking",
     "assumptions_of",
     "certified_bounds",
     "certify",
@@ -44,5 +42,4 @@ __all__ = [
     "simulate",
     "starter_project",
     "verify_design",
-    "walk_scene",
 ]

@@ -1,37 +1,24 @@
-"""Walking over rough terrain: ground, phase-space plan, whole-body motion."""
+"""Walking: ground, phase-space plan and its whole-body motion, gait, placement, controller."""
 
-from sealag.walking._planner import Stance, WalkPlan, plan_walk
-from sealag.walking._terrain import (
-    FlatTerrain,
-    ProfileTerrain,
-    Terrain,
-    paper_terrain,
-    rough_terrain,
-    stairs,
-)
-from sealag.walking._walk_motion import walk_motion
-from sealag.walking._walking import WalkingController, begin_walk
-from sealag.walking._walking_options import Prediction, WalkingGait, WalkingOptions
-from sealag.walking._walking_placement import PeriodicGait, periodic_gait
-from sealag.walking._walking_start import walking_start
+from sealag.walking._controller import WalkStart, begin_walk
+from sealag.walking._feet import Side
+from sealag.walking._gait import WalkingGait
+from sealag.walking._ground import Ground, GroundProfile
+from sealag.walking._motion import walk_motion
+from sealag.walking._options import Prediction, WalkingOptions
+from sealag.walking._planner import plan_walk
+from sealag.walking._walk import Walking
 
 __all__ = [
-    "FlatTerrain",
-    "PeriodicGait",
+    "Ground",
+    "GroundProfile",
     "Prediction",
-    "ProfileTerrain",
-    "Stance",
-    "Terrain",
-    "WalkPlan",
-    "WalkingController",
+    "Side",
+    "WalkStart",
+    "Walking",
     "WalkingGait",
     "WalkingOptions",
     "begin_walk",
-    "paper_terrain",
-    "periodic_gait",
     "plan_walk",
-    "rough_terrain",
-    "stairs",
     "walk_motion",
-    "walking_start",
 ]

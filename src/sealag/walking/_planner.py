@@ -8,12 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sealag.constants import GRAVITY
 from sealag.errors import InputError
 from sealag.typing import Array, ArrayLike
-from sealag.walking._terrain import Terrain
-
-GRAVITY = 9.81
-SIDES = ("right", "left")
+from sealag.walking._feet import Side
+from sealag.walking._ground import Ground
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +35,7 @@ class Stance:
         end: end of the phase, s.
     """
 
-    side: str
+    side: Side
     foot: Array
     height: float
     slope: float
@@ -68,13 +67,13 @@ class WalkPlan:
         stances: the support phases; one more than steps.
         previous_foot: (3,) where the first swing foot left the ground, m.
         next_foot: (3,) where the last swing foot would land, m.
-        terrain: the ground.
+        ground: the ground.
     """
 
     stances: tuple[Stance, ...]
     previous_foot: Array
     next_foot: Array
-    terrain: Terrain
+    ground: Ground
 
     @property
     def duration(self) -> float:
@@ -149,7 +148,7 @@ class WalkPlan:
             blend = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
             x, y, line = begin + (end - begin) * blend
             bump = 64.0 * (u * (1.0 - u)) ** 3
-            highest = max(highest, (self.terrain.height(x, y) - line) / max(bump, 0.05))
+            highest = max(highest, (self.ground.height(x, y) - line) / max(bump, 0.05))
         return highest
 
 
@@ -164,14 +163,14 @@ def _cubic(before: Stance, after: Stance, t: float) -> tuple[float, float]:
 
 
 def plan_walk(
-    terrain: Terrain,
+    ground: Ground,
     *,
     steps: int = 7,
     apex_speed: ArrayLike = 0.6,
     step_length: ArrayLike = 0.45,
     step_width: float = 0.2,
     com_height: ArrayLike = 0.86,
-    first_side: str = "right",
+    first_side: Side = Side.RIGHT,
 ) -> WalkPlan:
     """Plan a walk: footholds on the ground, apexes over them, switches where phase curves meet.
 
@@ -179,7 +178,7 @@ def plan_walk(
     The lateral foothold y_{k+1} = y_s + (ẏ_s / ω) coth(ω T) makes ẏ = 0 at the next apex.
 
     Args:
-        terrain: the ground.
+        ground: the ground.
         steps: number of steps, at least 1.
         apex_speed: forward speed over each foot, one number or steps + 1, m/s.
         step_length: forward distance of footholds, one number or one for each step, m.
@@ -194,8 +193,8 @@ def plan_walk(
         InputError: a number is out of range, or a step is so short or long for its speeds that
             its phase curves do not meet between the feet.
     """
-    if steps < 1 or first_side not in SIDES:
-        raise InputError("A walk needs at least one step, and begins on the right or left foot.")
+    if steps < 1:
+        raise InputError(f"A walk needs at least one step, not {steps}.")
     speeds = _numbers("apex_speed", apex_speed, steps + 1)
     heights = _numbers("com_height", com_height, steps + 1)
     lengths = _numbers("step_length", step_length, steps)
@@ -203,16 +202,15 @@ def plan_walk(
     x = np.concatenate([[0.0], np.cumsum(lengths)])
     omegas = np.sqrt(GRAVITY / heights)
     after, before = _switches(x, speeds, omegas)
-    sign = 1.0 if first_side == "right" else -1.0
-    y, offsets = _lateral(omegas, after, before, width=sign * width)
-    feet = _on_ground(terrain, x, y, lengths, width=sign * width)
+    width *= first_side.other.lateral
+    y, offsets = _lateral(omegas, after, before, width=width)
+    feet = _on_ground(ground, x, y, lengths, width=width)
     apexes = np.concatenate([[0.0], np.cumsum(after + before)])
     starts = np.concatenate([[0.0], apexes[1:] - before])
     ends = np.append(starts[1:], apexes[-1])
-    other = SIDES[1 - SIDES.index(first_side)]
     stances = tuple(
         Stance(
-            side=first_side if k % 2 == 0 else other,
+            side=first_side if k % 2 == 0 else first_side.other,
             foot=feet[k + 1],
             height=float(heights[k]),
             slope=float((feet[k + 2][2] - feet[k][2]) / (feet[k + 2][0] - feet[k][0])),
@@ -225,7 +223,7 @@ def plan_walk(
         )
         for k in range(steps + 1)
     )
-    return WalkPlan(stances=stances, previous_foot=feet[0], next_foot=feet[-1], terrain=terrain)
+    return WalkPlan(stances=stances, previous_foot=feet[0], next_foot=feet[-1], ground=ground)
 
 
 def _numbers(name: str, values: ArrayLike, count: int) -> Array:
@@ -281,11 +279,9 @@ def _lateral(omega: Array, after: Array, before: Array, *, width: float) -> tupl
     return np.array(y), np.array(offsets)
 
 
-def _on_ground(
-    terrain: Terrain, x: Array, y: Array, lengths: Array, *, width: float
-) -> list[Array]:
+def _on_ground(ground: Ground, x: Array, y: Array, lengths: Array, *, width: float) -> list[Array]:
     """The foot before the first, the feet of the walk, and the foot after the last."""
     side = width if len(x) % 2 else -width
     xs = [-lengths[0], *x, x[-1] + lengths[-1]]
     ys = [width, *y, y[-1] + side]
-    return [np.array([a, b, terrain.height(a, b)]) for a, b in zip(xs, ys, strict=True)]
+    return [np.array([a, b, ground.height(a, b)]) for a, b in zip(xs, ys, strict=True)]

@@ -125,7 +125,7 @@ class _Search:
         self._signal: SignalState = law.signal.start(evaluation, delay_bound=0.0)
         self._plant = LinkPlant(robot, contacts)
         self._places = self._plant.places(self._posture)
-        self._scale = max(9.81 * robot.mass, float(np.abs(robot.gravity(posture)).max()), 1e-3)
+        self._scale = max(robot.weight, float(np.abs(robot.gravity(posture)).max()), 1e-3)
 
     def run(self) -> Rest:
         """Return the equilibrium; without one the posture, with the reason."""

@@ -1,6 +1,7 @@
 """Walking with springs and delay: whole-body law, weight transfer, steps, all at one tick."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,17 +9,17 @@ from sealag.actuation import Actuators
 from sealag.errors import InputError, SolverError
 from sealag.robot import Robot
 from sealag.typing import Array
-from sealag.walking._terrain import Terrain
-from sealag.walking._walking_options import (
+from sealag.walking._estimator import Body, Estimator
+from sealag.walking._feet import Side
+from sealag.walking._options import (
     JointAngles,
     Prediction,
-    WalkingGait,
     WalkingOptions,
 )
-from sealag.walking._walking_placement import Placement
-from sealag.walking._walking_start import walking_start
-from sealag.walking._walking_state import Body, Estimator
-from sealag.walking._walking_step import StepReferences
+from sealag.walking._placement import Placement
+from sealag.walking._start import walking_start
+from sealag.walking._step import StepReferences
+from sealag.walking._walk import Walking
 from sealag.whole_body import Measurement
 
 _DAMPING = 1e-9  # share of the trace: bounds torques near a straight knee
@@ -38,10 +39,7 @@ class WalkingController:
     Args:
         robot: Floating base, six actuated joints.
         actuators: Springs and motors as the controller believes them to be.
-        terrain: The ground as the controller believes it to be.
-        feet: Frames of the left and the right foot.
-        gait: The plan.
-        options: Which means are used, and their gains.
+        walking: Feet, gait, means and gains, and the ground as the controller believes it to be.
         period: Time between two ticks, s.
 
     Attributes:
@@ -55,11 +53,8 @@ class WalkingController:
         self,
         robot: Robot,
         actuators: Actuators,
-        terrain: Terrain,
+        walking: Walking,
         *,
-        feet: tuple[str, str] = ("left_foot", "right_foot"),
-        gait: WalkingGait | None = None,
-        options: WalkingOptions | None = None,
         period: float = 1e-3,
     ) -> None:
         from sealag.kernels import walking_law
@@ -72,10 +67,9 @@ class WalkingController:
         if not (math.isfinite(period) and period > 0.0):
             raise InputError(f"the controller's period must be a time > 0 s, got {period}")
         self._kernel, self._robot, self._actuators = walking_law, robot, actuators
-        self._terrain, self._period = terrain, period
-        self.feet = tuple(robot.check_frame(foot) for foot in feet)
-        self.gait, self.options = gait or WalkingGait(), options or WalkingOptions()
-        self._body = Body(robot, feet)
+        self._ground, self._period = walking.ground, period
+        self.gait, self.options = walking.gait, walking.options
+        self._body = Body(robot, walking.feet)
         self._torque_limit = np.where(np.isfinite(robot.effort_limit), robot.effort_limit, 1e3)
         self._D = np.ascontiguousarray(actuators.motor_damping)
         self._D_by_K = actuators.motor_damping / actuators.spring_stiffness
@@ -104,17 +98,18 @@ class WalkingController:
         body.q[:], body.v[:] = measurement.q, measurement.v
         body.update()
         self.placement = Placement(gait, self.options, self._robot.mass)
-        self.step = StepReferences(gait, self._terrain, step_length=self.placement.plan.step_length)
-        self.step.stance = int(contact.argmax())
-        feet = np.stack([body.foot(0), body.foot(1)])
+        self.step = StepReferences(gait, self._ground, step_length=self.placement.plan.step_length)
+        stance = Side(int(contact.argmax()))
+        feet = body.feet()
         self.step.start(
             t,
+            stance,
             phase=0.5 * (gait.step_time + gait.transfer_time),
             com=np.array([body.com[0][2], body.com[1][2]]),
             feet=feet,
-            swing=body.foot_rate(1 - self.step.stance),
+            swing=body.foot_rate(stance.other),
         )
-        self._estimator.reset(feet, self.step.stance)
+        self._estimator.reset(feet, stance)
         self._first = True
 
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
@@ -140,7 +135,7 @@ class WalkingController:
         )
         if phase >= self.gait.transfer_time:
             if not step.swinging:
-                step.lift(body.foot(1 - step.stance))
+                step.lift(body.foot(step.swing_foot))
             step.move(now, self._period)
         if not self._tasks(now, phase):
             raise SolverError("the walking law has no finite torque in this state")
@@ -153,13 +148,13 @@ class WalkingController:
         )  # fmt: skip
         self._estimator.sent(out, t + age + options.embedded_delay)
 
-    def motor_start(self, q: Array, v: Array, *, stance: int = 1) -> Array:
+    def motor_start(self, q: Array, v: Array, *, stance: Side = Side.RIGHT) -> Array:
         """Return motor angles (n,) whose springs carry the first task torque, rad.
 
         Args:
             q: Configuration at the start (nq,).
             v: Velocity at the start (nv,).
-            stance: Foot stood on: 0 left, 1 right.
+            stance: Foot stood on.
         """
         robot = self._robot
         first = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n, contacts=2)
@@ -189,9 +184,9 @@ class WalkingController:
         """Begin the next step when planned, or when the swing foot is seen on the ground."""
         step, gait = self.step, self.gait
         late = step.phase(now) > _LATE_SWING * gait.step_time + 0.4 * gait.transfer_time
-        touched = self.options.early_contact and late and contact[1 - step.stance] > 0.0
+        touched = self.options.early_contact and late and contact[step.swing_foot] > 0.0
         if touched or step.phase(now) >= gait.step_time - 1e-9:
-            step.change(now, np.stack([self._body.foot(0), self._body.foot(1)]))
+            step.change(now, self._body.feet())
             self.placement.restart()
 
     # Law -----------------------------------------------------------------------------------------
@@ -221,35 +216,45 @@ def _gains(options: WalkingOptions, period: float) -> tuple[Array, Array]:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkStart:
+    """A walking controller and the state in which its walk begins.
+
+    Attributes:
+        controller: the controller.
+        q: configuration (nq,).
+        v: velocity (nv,).
+        theta: motor angles (n,) whose springs carry the first task torque, rad.
+        theta_dot: motor speeds (n,), those of the joints, rad/s.
+    """
+
+    controller: WalkingController
+    q: Array
+    v: Array
+    theta: Array
+    theta_dot: Array
+
+
 def begin_walk(
-    robot: Robot,
-    actuators: Actuators,
-    terrain: Terrain,
-    *,
-    feet: tuple[str, str] = ("left_foot", "right_foot"),
-    gait: WalkingGait | None = None,
-    options: WalkingOptions | None = None,
-    period: float = 1e-3,
-) -> tuple[WalkingController, Array, Array, Array]:
-    """Return a walking controller and the state in which its walk begins.
+    robot: Robot, actuators: Actuators, walking: Walking, *, period: float = 1e-3
+) -> WalkStart:
+    """Return a walking controller and the state in which its walk begins, on the right foot.
 
     Args:
         robot: Biped with a floating base and six joints.
         actuators: Springs and motors as the controller believes them to be.
-        terrain: The ground.
-        feet: Frames of the left and the right foot.
-        gait: The plan.
-        options: Means and gains of the controller.
+        walking: What walks where, and how.
         period: Time between two ticks, s.
-
-    Returns:
-        The controller, q (nq,), v (nv,) and motor angles (n,) that carry the first torque, rad.
 
     Raises:
         InputError: The robot is not such a biped, or its legs cannot take the posture.
     """
-    controller = WalkingController(
-        robot, actuators, terrain, feet=feet, gait=gait, options=options, period=period
+    controller = WalkingController(robot, actuators, walking, period=period)
+    q, v = walking_start(robot, walking)
+    return WalkStart(
+        controller=controller,
+        q=q,
+        v=v,
+        theta=controller.motor_start(q, v),
+        theta_dot=robot.joint_velocities(v),
     )
-    q, v = walking_start(robot, terrain, gait=controller.gait, feet=feet)
-    return controller, q, v, controller.motor_start(q, v)

@@ -1,7 +1,7 @@
-"""What a walk should look like, and the means by which the controller works against the delay."""
+"""The means by which the walking controller works against the delay, and its gains."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Any, Self
 
@@ -28,48 +28,6 @@ class JointAngles(StrEnum):
     """Motor angles."""
     STATIC_JOINT = "static_joint"
     """Motor angles less what the last task torque winds the springs."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WalkingGait:
-    """The gait that the walk shall have. Assumptions of ours: the paper gives none of them.
-
-    Attributes:
-        apex_speed: Forward speed of the CoM over the stance foot, m/s.
-        step_time: From touchdown to touchdown, s.
-        transfer_time: Double support at the step's beginning in which the weight moves from the
-            old to the new foot, s.
-        com_height: CoM over the ground, mean of two footholds, m.
-        step_width: Distance of successive footholds across the direction of walking, m.
-        clearance: Height of the swing foot over the higher of the grounds below it, m.
-        foot_radius: Height of the foot frame over the ground when standing, m.
-        smallest_width: Footholds are never placed closer than this across, m.
-
-    Raises:
-        InputError: A value is not a positive number, or the weight transfer fills the step.
-    """
-
-    apex_speed: float = 0.5
-    step_time: float = 0.35
-    transfer_time: float = 0.06
-    com_height: float = 0.86
-    step_width: float = 0.26
-    clearance: float = 0.08
-    foot_radius: float = 0.025
-    smallest_width: float = 0.12
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(
-                    f"The gait's {field.name} is {value}; it must be positive and finite."
-                )
-        if self.transfer_time > 0.6 * self.step_time:
-            raise InputError(
-                f"The weight transfer of {self.transfer_time:g} s leaves too little of the step of "
-                f"{self.step_time:g} s: at most 60 % is right."
-            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,11 +103,10 @@ class WalkingOptions:
         if self.lead_time == 0.0:
             raise InputError("The lead_time must be positive; leave the lead out with lead=False.")
 
-    @classmethod
-    def published(cls, **changes: Any) -> Self:
+    def published(self, **changes: Any) -> Self:
         """Return the law of Eqs. (11) and (17) with plain D_θ θ̇: position feedback and gravity.
 
-        The footsteps and the order of the steps are planned as always.
+        Footsteps and the order of the steps are planned as before.
 
         Args:
             changes: Options to set otherwise.
@@ -164,4 +121,4 @@ class WalkingOptions:
             "task_damping": 0.0,
             "feedback": JointAngles.STATIC_JOINT,
         }
-        return cls(**{**options, **changes})
+        return replace(self, **{**options, **changes})

@@ -1,15 +1,11 @@
 """Whole-body inverse kinematics: a plan becomes a motion of the robot."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from sealag.errors import RobotError
 from sealag.robot import Contact, Motion, Robot, Workspace
 from sealag.typing import Array
 from sealag.walking._planner import WalkPlan
-
-FEET = {"right": "right_foot", "left": "left_foot"}
 
 
 def walk_motion(
@@ -18,7 +14,7 @@ def walk_motion(
     *,
     rate: float = 1000.0,
     clearance: float = 0.06,
-    feet: Mapping[str, str] = FEET,
+    feet: tuple[str, str] = ("left_foot", "right_foot"),
     base_frame: str = "torso",
 ) -> Motion:
     """Turn a plan into a motion of a biped with three actuated joints a leg.
@@ -32,7 +28,7 @@ def walk_motion(
         plan: the walk.
         rate: instants per second.
         clearance: of the swing foot, m.
-        feet: frame of each foot by its side.
+        feet: frames of the left and the right foot.
         base_frame: the frame that stays upright.
 
     Returns:
@@ -48,11 +44,10 @@ def walk_motion(
     q = _first_guess(robot, plan)
     qs, vs = np.zeros((len(times), robot.nq)), np.zeros((len(times), robot.nv))
     index = np.zeros(len(times), dtype=np.int64)
-    sides = list(feet)
     for i, t in enumerate(times):
         k = plan.index(t)
-        stance = feet[plan.stances[k].side]
-        swing = next(frame for frame in feet.values() if frame != stance)
+        side = plan.stances[k].side
+        stance, swing = feet[side], feet[side.other]
         com, com_rate = plan.com(t)
         foot, foot_rate = plan.swing(t, clearance=clearance)
         targets = (com, plan.stances[k].foot, foot)
@@ -70,12 +65,12 @@ def walk_motion(
         J = _jacobian(at, stance, swing, base=base_frame)
         rates = np.concatenate([com_rate, np.zeros(3), foot_rate, np.zeros(3)])
         qs[i], vs[i] = q, np.linalg.solve(J, rates)
-        index[i] = sides.index(plan.stances[k].side)
+        index[i] = side
     return Motion(
         time=times,
         q=qs,
         v=vs,
-        contact_sets=tuple((Contact(frame=feet[side]),) for side in sides),
+        contact_sets=tuple((Contact(frame=frame),) for frame in feet),
         contact_index=index,
     )
 

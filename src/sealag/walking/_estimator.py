@@ -5,8 +5,9 @@ import numpy as np
 from sealag.actuation import Actuators
 from sealag.robot import Robot
 from sealag.typing import Array
-from sealag.walking._walking_options import Prediction
-from sealag.walking._walking_step import StepReferences
+from sealag.walking._feet import Side
+from sealag.walking._options import Prediction
+from sealag.walking._step import StepReferences
 
 _RING = 512
 
@@ -42,6 +43,10 @@ class Body:
     def gravity(self) -> Array:
         """Return the gravity torque (nv,)."""
         return self._workspace.gravity()
+
+    def feet(self) -> Array:
+        """Return the positions of both feet (2, 3), m."""
+        return np.stack([self.foot(side) for side in Side])
 
     def foot(self, foot: int) -> Array:
         """Return a copy of a foot's position (3,), m."""
@@ -140,7 +145,7 @@ class Estimator:
             body.update()
             self._anchor[new] = self._anchor[old] + body.foot(new) - body.foot(old)
             x, y, _ = self._anchor[new].tolist()
-            self._anchor[new, 2], self._stance = step.ground(x, y), new
+            self._anchor[new, 2], self._stance = step.foot_height(x, y), new
 
 
 def motor_table(actuators: Actuators, period: float) -> Array:

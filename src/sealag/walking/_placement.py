@@ -1,71 +1,17 @@
 """Where the next foot must land, from the predicted end of the step."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from sealag.typing import Array
-from sealag.walking._walking_options import WalkingGait, WalkingOptions
-from sealag.walking._walking_step import StepReferences
+from sealag.walking._gait import WalkingGait
+from sealag.walking._options import WalkingOptions
+from sealag.walking._step import StepReferences
 
-GRAVITY = 9.81
 _FORWARD = (-0.15, 0.55)  # m from the stance foot: what the legs reach
 _WIDEST = 0.5  # m
 _FASTER = 0.3  # largest relative correction of the speed
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PeriodicGait:
-    """The periodic motion of the pendulum on flat ground that a gait asks for.
-
-    During the weight transfer of duration d the centre of pressure moves linearly from foot to
-    foot. With ω² = g/h, e = exp(ωT) and κ = e (1 − (1 − exp(−ωd))/(ωd)), the capture point
-    ξ = x + ẋ/ω at the end of a step, from the foot stood on, is
-
-        ξ_x = (v_a/ω) exp(ω(T−d)/2),   ξ_y = w (e−κ)/(e+1),   and   L = ξ_x (e−1)/(e−κ).
-
-    Attributes:
-        rate: ω, 1/s.
-        growth: e.
-        carried: κ, the part of it that the old foot still carries.
-        end_forward: ξ_x, m.
-        end_outward: ξ_y, m.
-        step_length: L, m.
-        apex_outward: Distance of the CoM from the stance foot across, at the apex, m.
-    """
-
-    rate: float
-    growth: float
-    carried: float
-    end_forward: float
-    end_outward: float
-    step_length: float
-    apex_outward: float
-
-
-def periodic_gait(gait: WalkingGait) -> PeriodicGait:
-    """Return the pendulum's periodic motion of a gait.
-
-    Args:
-        gait: The plan.
-    """
-    rate = math.sqrt(GRAVITY / gait.com_height)
-    growth = math.exp(rate * gait.step_time)
-    shift = rate * gait.transfer_time
-    carried = growth * (1.0 - (1.0 - math.exp(-shift)) / shift)
-    swing = math.exp(0.5 * rate * (gait.step_time - gait.transfer_time))
-    forward = gait.apex_speed / rate * swing
-    outward = gait.step_width * (growth - carried) / (growth + 1.0)
-    return PeriodicGait(
-        rate=rate,
-        growth=growth,
-        carried=carried,
-        end_forward=forward,
-        end_outward=outward,
-        step_length=forward * (growth - 1.0) / (growth - carried),
-        apex_outward=outward / swing,
-    )
 
 
 class Placement:
@@ -85,7 +31,7 @@ class Placement:
         from sealag.kernels import walking
 
         self._kernel, self._gait, self._options, self._mass = walking, gait, options, mass
-        self.plan = periodic_gait(gait)
+        self.plan = gait.periodic()
         plan = self.plan
         self._numbers = np.array(
             [
@@ -126,13 +72,13 @@ class Placement:
             share = 1.0 - math.exp(-period / options.placement_time)
         self._fresh = False
         faster = 1.0 + (self._faster if options.bias_gain > 0.0 else 0.0)
-        numbers[5], numbers[11] = self.plan.end_forward * faster, step.outward()
+        numbers[5], numbers[11] = self.plan.end_forward * faster, step.outward
         x, y = self._kernel.capture_end(
             com, com_rate, momentum, step.old, step.new, step.height, step.offset, phase, numbers,
             share, self._end,
         )  # fmt: skip
         if gait.step_time - phase > options.placement_freeze:
-            step.target[0], step.target[1], step.target[2] = x, y, step.ground(x, y)
+            step.target[0], step.target[1], step.target[2] = x, y, step.foot_height(x, y)
 
     def _watch_apex(self, ahead: float, speed: float, pendulum: float) -> None:
         """Integrate the relative error of the apex speed; begin with what the legs' momentum adds.

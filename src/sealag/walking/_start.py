@@ -7,21 +7,14 @@ import numpy as np
 from sealag.errors import InputError
 from sealag.robot import Robot, Workspace
 from sealag.typing import Array
-from sealag.walking._terrain import Terrain
-from sealag.walking._walking_options import WalkingGait
-from sealag.walking._walking_placement import periodic_gait
+from sealag.walking._feet import Side
+from sealag.walking._walk import Walking
 
 _SWING_SPEED = 1.6  # mid-swing speed of the foot in mean speeds of its swing
-_SIDE = (1.0, -1.0)
 
 
 def walking_start(
-    robot: Robot,
-    terrain: Terrain,
-    *,
-    gait: WalkingGait | None = None,
-    feet: tuple[str, str] = ("left_foot", "right_foot"),
-    stance: int = 1,
+    robot: Robot, walking: Walking, *, stance: Side = Side.RIGHT
 ) -> tuple[Array, Array]:
     """Return configuration (nq,) and velocity (nv,) at the apex of a gait.
 
@@ -30,22 +23,20 @@ def walking_start(
 
     Args:
         robot: Biped with a floating base and six joints.
-        terrain: The ground.
-        gait: The plan; default as for the controller.
-        feet: Frames of the left and the right foot.
-        stance: Foot stood on: 0 left, 1 right.
+        walking: Feet, ground and gait.
+        stance: Foot stood on.
 
     Raises:
         InputError: The legs cannot take this posture.
     """
-    gait = gait or WalkingGait()
-    plan, side = periodic_gait(gait), _SIDE[1 - stance]
+    gait, feet = walking.gait, walking.feet
+    plan, side = gait.periodic(), stance.other.lateral
     place = np.array([0.0, -side * plan.apex_outward])
-    ground = terrain.height(*place) + gait.foot_radius
-    stand = np.array([*place, ground])
-    swing = np.array([0.0, place[1] + side * gait.step_width, ground + gait.clearance])
-    com = np.array([0.0, 0.0, ground - gait.foot_radius + gait.com_height])
-    targets = (com, (stand, swing) if stance == 0 else (swing, stand))
+    level = walking.ground.height(*place)
+    stand = np.array([*place, level + gait.foot_radius])
+    swing = stand + np.array([0.0, side * gait.step_width, gait.clearance])
+    com = np.array([0.0, 0.0, level + gait.com_height])
+    targets = (com, (stand, swing) if stance is Side.LEFT else (swing, stand))
     at = robot.workspace()
     q = _posture(robot, at, feet, targets=targets)
     at.update(q, np.zeros(robot.nv))
@@ -54,7 +45,7 @@ def walking_start(
             at.frame_jacobian(feet[stance])[:3].copy(),
             at.com_jacobian().copy(),
             np.eye(robot.nv)[3:6],
-            at.frame_jacobian(feet[1 - stance])[:3].copy(),
+            at.frame_jacobian(feet[stance.other])[:3].copy(),
         ]
     )
     rows[8] = at.centroidal_map()[5]

@@ -110,7 +110,7 @@ def render_page(title: str, lead: str, sections: Sequence[Section], *, footer: s
     import jinja2
 
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("sealag.report"), autoescape=True, trim_blocks=True
+        loader=jinja2.PackageLoader("humanoids2016"), autoescape=True, trim_blocks=True
     )
     plain = [
         {
