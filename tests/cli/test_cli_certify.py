@@ -68,6 +68,7 @@ def test_motion_of_many_instants(tmp_path, cli):
     assert min(whole["bounds_s"]) == whole["max_delay_s"]
 
 
+@pytest.mark.slow
 def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, cli):
     """Seven steps at 1 kHz, default proofs, common and time-varying multipliers."""
     from sealag.design import load, save_motion

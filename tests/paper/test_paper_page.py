@@ -11,6 +11,8 @@ import pytest
 
 from humanoids2016 import QUICK, AblationTable, DelayMap, study, write_paper_page
 
+pytestmark = pytest.mark.slow
+
 
 class Links(HTMLParser):
     def __init__(self):

@@ -29,6 +29,8 @@ from sealag.whole_body import (
     Task,
 )
 
+pytestmark = pytest.mark.slow
+
 SEED, DRAWS = 4, 130
 MOTOR, STATIC, TANK = MotorAngles(), StaticJoint(), Tank(rate=0.0)
 PLANNED, DELAYED = GravityCompensation.PLANNED, GravityCompensation.FEEDBACK

@@ -16,6 +16,8 @@ from sealag.report import run_summary
 from sealag.simulation import Outcome
 from sealag.whole_body import SIGNAL_NAMES, GravityCompensation, signal_named
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("anymal", "anymal_crawl", "baxter", "hume_held", "talos")
 SCENARIOS = ("regulate", "track", "drop", "balance")
 
