@@ -1,6 +1,7 @@
 """What is declared is imported, and what is imported is declared."""
 
 import ast
+import functools
 import re
 import sys
 import tomllib
@@ -52,7 +53,8 @@ def own_modules() -> set[str]:
     return {path.name for parent in parents if parent.is_dir() for path in parent.iterdir()}
 
 
-def distributions(folders: Iterable[str]) -> set[str]:
+@functools.cache
+def distributions(folders: tuple[str, ...]) -> set[str]:
     """Return the distributions that the sources in some folders import from."""
     own, owners = own_modules() | set(sys.stdlib_module_names), packages_distributions()
     modules = {
