@@ -12,6 +12,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ("src", "studies")
 BESIDE = ("tests", "bench")
+ELSEWHERE = ROOT / "bench/peers"
+"""Scripts that run in environments of their own, which the benchmark builds."""
 IN_CMEEL = {"pinocchio": "pin"}
 """Imports whose distribution Python does not find: cmeel keeps them in a prefix of its own."""
 COMMANDS = {
@@ -61,6 +63,7 @@ def distributions(folders: tuple[str, ...]) -> set[str]:
         module
         for folder in folders
         for path in (ROOT / folder).rglob("*.py")
+        if ELSEWHERE not in path.parents
         for module in imports(path.read_text())
     }
     return {distribution(module, owners.get(module, [])) for module in modules - own}
