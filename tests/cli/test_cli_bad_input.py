@@ -1,15 +1,13 @@
 """Bad input: one sentence that names file, key and remedy, exit status 2, never a traceback."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from sealag.cli import main
 from sealag.design import load, motion_table, save_motion
-from sealag.robot import bundled_robot_path
+from sealag.robot import resolve_urdf
 
-GOOD = Path(str(bundled_robot_path("hume"))).with_suffix(".toml").read_text()
+GOOD = resolve_urdf("bundled:hume.urdf").with_suffix(".toml").read_text()
 
 
 def fails(capsys, *arguments):

@@ -1,17 +1,16 @@
 """The command line: parse, call one function, show. Nothing heavy is imported until it is used."""
 
-import json
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
-from sealag import __version__
 from sealag.errors import SealagError, SolverError
+from sealag.version import __version__
 
 WRONG_INPUT, FAILED = 2, 3
 """Exit statuses besides 0, yes, and 1, a decided no."""
@@ -234,15 +233,6 @@ def paper(
     from sealag.cli._commands import write_paper
 
     write_paper(project, out, quick=quick, as_json=as_json)
-
-
-def show_json(answer: dict[str, Any]) -> None:
-    """Print one JSON object to standard output.
-
-    Args:
-        answer: what to print; it must hold finite numbers only.
-    """
-    print(json.dumps(answer, allow_nan=False))
 
 
 def _write_no_more() -> None:

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from sealag.cli._app import show_json
+from sealag.cli._json import show_json
 from sealag.design import (
     System,
     certify,

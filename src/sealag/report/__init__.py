@@ -1,13 +1,11 @@
 """Recordings of runs as MCAP files."""
 
 from sealag.report._mcap import McapRecorder
-from sealag.report._mcap_reader import RecordingFile, Signal, read_recording
+from sealag.report._mcap_reader import read_recording
 from sealag.report._recording import write_run
 
 __all__ = [
     "McapRecorder",
-    "RecordingFile",
-    "Signal",
     "read_recording",
     "write_run",
 ]
