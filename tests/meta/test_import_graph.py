@@ -5,7 +5,6 @@ from graphlib import CycleError, TopologicalSorter
 
 from helpers.source import imported, modules, tree
 
-
 PENDING = ("sealag.design.", "sealag.whole_body.")
 """Rooms whose cycles of late imports others are resolving now."""
 
