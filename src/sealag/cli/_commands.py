@@ -19,7 +19,7 @@ from sealag.design import (
     starter_project,
 )
 from sealag.errors import CertificateError, FileError, InputError
-from sealag.files import check_output, make_folder, write_text
+from sealag.files import check_output, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
@@ -262,7 +262,6 @@ def write_paper(project: str, out: Path, *, quick: bool, as_json: bool) -> None:
             f"The study of the paper is not installed: Python finds no package {STUDY}. It comes "
             "with sealag's wheel; in a checkout run make setup."
         ) from error
-    make_folder(out)
     answer = study.reproduce(
         out,
         project=project,
