@@ -153,10 +153,10 @@ def test_margin_command(cli):
 @pytest.mark.parametrize("base", ["--fixed", "--floating"])
 def test_starter_file_answers_once_filled(base, tmp_path, cli):
     """Held by its torso Hume is certified; on two point feet no posture of it is at rest."""
-    from sealag.robot import bundled_robot_path
+    from sealag.robot import resolve_urdf
 
     path = tmp_path / "mine.toml"
-    code, _, _ = cli("init", bundled_robot_path("hume"), "--out", path, base)
+    code, _, _ = cli("init", resolve_urdf("bundled:hume.urdf"), "--out", path, base)
     assert code == 0
     code, _, err = cli("certify", path)
     assert code == 2
@@ -178,7 +178,7 @@ def test_starter_file_answers_once_filled(base, tmp_path, cli):
     if base == "--floating":
         assert "no equilibrium" in answer["reasons"][0]
     assert cli("verify", tmp_path / "c.json")[0] == 0
-    code, _, err = cli("init", bundled_robot_path("hume"), "--out", path)
+    code, _, err = cli("init", resolve_urdf("bundled:hume.urdf"), "--out", path)
     assert code == 2
     assert "exists already" in err
 

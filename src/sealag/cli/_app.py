@@ -1,17 +1,16 @@
 """The command line: options, exit statuses, messages. Commands import what they use."""
 
-import json
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
-from sealag import __version__
 from sealag.errors import SealagError, SolverError
+from sealag.version import __version__
 
 WRONG_INPUT, FAILED = 2, 3
 """Exit statuses besides 0, yes, and 1, a decided no."""
@@ -241,15 +240,6 @@ def cite(as_json: Json = False) -> None:
     from sealag.cli._cite import show_citations
 
     show_citations(as_json=as_json)
-
-
-def show_json(answer: dict[str, Any]) -> None:
-    """Print one JSON object to standard output.
-
-    Args:
-        answer: what to print; it must hold finite numbers only.
-    """
-    print(json.dumps(answer, allow_nan=False))
 
 
 def _write_no_more() -> None:

@@ -2,8 +2,8 @@
 
 from importlib import resources
 
-from sealag import __version__
-from sealag.cli._app import show_json
+from sealag.cli._json import show_json
+from sealag.version import __version__
 
 
 def show_citations(*, as_json: bool) -> None:

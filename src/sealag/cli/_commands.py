@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from sealag import design
-from sealag.cli._app import show_json
+from sealag.cli._json import show_json
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
-from sealag.files import check_output, make_folder, write_text
+from sealag.files import check_output, write_text
 from sealag.passivity import Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
@@ -64,11 +64,9 @@ def _busy(what: str) -> Iterator[None]:
 
 def _motion(system: System, path: Path | None) -> Motion | None:
     chosen = path or system.motion_file
-    return (
-        None
-        if chosen is None
-        else design.load_motion(chosen, system.robot, contacts=system.contacts)
-    )
+    if chosen is None:
+        return None
+    return design.load_motion(chosen, system.robot, contacts=system.contacts)
 
 
 def certify_project(
@@ -258,7 +256,6 @@ def write_paper(project: str, out: Path, *, quick: bool, as_json: bool) -> None:
             f"The study of the paper is not installed: Python finds no package {STUDY}. It comes "
             "with sealag's wheel; in a checkout run make setup."
         ) from error
-    make_folder(out)
     answer = study.reproduce(
         out,
         project=project,

@@ -7,15 +7,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-import sealag
 from sealag import design
-from sealag.cli._app import show_json
 from sealag.cli._commands import compile_kernels
+from sealag.cli._json import show_json
 from sealag.design import System
 from sealag.errors import InputError
 from sealag.files import check_output
 from sealag.report import run_summary, write_run
-from sealag.simulation import Outcome, Passivity, Run, measure_gait
+from sealag.simulation import MeasuredGait, Outcome, Run
+from sealag.version import __version__
 
 T = TypeVar("T")
 Progress = Callable[[float], None]
@@ -85,7 +85,7 @@ def _record(run: Run, system: System, path: Path) -> None:
                 system.robot,
                 path,
                 project=system.text,
-                version=sealag.__version__,
+                version=__version__,
                 progress=progress,
             ),
         )
@@ -116,7 +116,7 @@ def gait_summary(system: System, run: Run) -> dict[str, Any]:
     """
     walking = system.walking
     assert walking is not None
-    gait = measure_gait(system.robot, run, walking)
+    gait = MeasuredGait.of(system.robot, run, walking)
     return {
         "steps": gait.steps,
         "apex_speed_m_s": gait.apex_speed.tolist(),
@@ -153,9 +153,14 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
         )
     if books.tank is not None:
         print(f"{'energy tank':26} {books.tank[0]:.4f} J at first, {books.tank[-1]:.4f} J at last")
-    _show_side("joint side", books.joint_side)
-    _show_side("controller side", books.controller_side)
-    _show_side("delay and damping", books.delay_side)
+    sides = {
+        "joint side": books.joint_side,
+        "controller side": books.controller_side,
+        "delay and damping": books.delay_side,
+    }
+    for name, side in sides.items():
+        if side is not None:
+            print(f"{name:26} {side.verdict}")
     if "steps" in answer:
         speeds = ", ".join(f"{v:.2f}" for v in answer["apex_speed_m_s"])
         widths = ", ".join(f"{w:.2f}" for w in answer["step_width_m"])
@@ -163,15 +168,3 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
         print(f"{'apex speeds':26} {speeds} m/s")
         print(f"{'step widths':26} {widths} m")
     print(f"{'recording':26} {answer['recording']}")
-
-
-def _show_side(name: str, side: Passivity | None) -> None:
-    """Print the passivity observer's verdict on one side, if it has one."""
-    if side is None:
-        return
-    where = ""
-    if side.first_violation is not None:
-        where = (
-            f" by {-side.slack.min():.1e} J, first at {side.first_violation:.3f} s, {side.joint}"
-        )
-    print(f"{name:26} {'passive' if side.passive else 'not passive'}{where}")

@@ -24,8 +24,8 @@ def rightmost_roots(
 
     The generator of the solution semigroup is discretised on Chebyshev nodes over the longer delay,
     in two pieces where there are two delays (Breda, Maset & Vermiglio), for the signals that act
-    late only, and every root refined by Newton's method on the characteristic equation. Independent of `delay_margin`; a heuristic where
-    `nodes` resolve too little.
+    late only. Every root is refined by Newton's method on the characteristic equation. Independent
+    of `delay_margin`; a heuristic where `nodes` resolve too little.
 
     Args:
         A_0: (n, n) undelayed part, 1/s.
