@@ -9,9 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 THEORY = ROOT / "docs/theory"
 PAGES = sorted(THEORY.glob("*.md"))
 NUMBER = r"\d+(?:\.\d+)?"
-CITATION = re.compile(
-    rf"(?:docs/theory|THEORY),? sections? ({NUMBER}(?:(?:, | and | to ){NUMBER})*)"
-)
+CITATION = re.compile(rf"docs/theory,? sections? ({NUMBER}(?:(?:, | and | to ){NUMBER})*)")
 
 
 def headings(text: str) -> set[str]:
