@@ -49,7 +49,7 @@ def gravity_slope(robot, q):
 
 
 def by_hand(system, q, *, late=False, links=False):
-    """A_0, A_1, A_e of docs/theory sections 1, 2 over [q, θ, q̇, θ̇, τ_m]; late torque feedback if so.
+    """A_0, A_1, A_e of docs/theory sections 1, 2 over [q, θ, q̇, θ̇, τ_m]; late feedback if so.
 
     M q̈ = −G q + τ_s − D_j q̇, τ_s = K (θ − q) + D_s (θ̇ − q̇), B θ̈ = τ_m − τ_s − b θ̇,
     τ_m = B/B_s (u − D θ̇) + (1 − B/B_s) τ_s, behind a bandwidth ω: τ̇_m = ω (that − τ_m).
