@@ -7,7 +7,6 @@ from scipy.optimize import minimize
 
 from helpers.kernels import from_python
 from sealag.kernels import contact, friction, linalg, spatial
-from sealag.robot import load_robot
 from sealag.whole_body import Measurement
 
 FEET = ("left_foot", "right_foot")
@@ -15,11 +14,6 @@ SOLVE, SETTLE = from_python(friction.solve), from_python(friction.settle)
 PROJECT, CHOLESKY = from_python(contact.project), from_python(linalg.cholesky)
 EQUATIONS = from_python(friction.allocate_equations)
 INTEGRATE, TANGENT_RATE = from_python(spatial.integrate), from_python(spatial.tangent_rate)
-
-
-@pytest.fixture(scope="module")
-def hume():
-    return load_robot("bundled:hume.urdf", floating_base=True)
 
 
 class TestManifold:
