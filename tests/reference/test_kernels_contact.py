@@ -47,15 +47,8 @@ def test_a_measurement_row():
         "velocity": (3, 3), "gap": (3,), "power": (4,), "energy": (2,),
     }  # fmt: skip
     now = contact.Instant(**{name: rng.normal(size=shape) for name, shape in shapes.items()})
-    contacts = contact.Contacts(
-        frame=np.array([0, 0, 1]), offset=np.zeros((3, 3)), C=np.tile(np.eye(3), (3, 1, 1)),
-        anchor=np.zeros((3, 3)), friction=np.ones(3), ridge=np.ones(3), radius=np.zeros(3),
-        torsion_damping=np.zeros(2), torsion_radius=np.zeros(2), load=np.zeros((0, 3)),
-        closed=np.array([0, 1, 0]), yielding=np.zeros(3), floor=np.zeros(3), ground_x=np.zeros(1),
-        ground_z=np.zeros(1), stabilisation=50.0, stop_time=1e-3, weight=1.0,
-    )  # fmt: skip
     row = np.full(1 + 8 + 7 + 3 + 2, np.nan)
-    contact.sense(tuple(contacts), tuple(now), 0.5, row)
+    contact.sense(tuple(now), np.array([0, 1, 0]), np.array([0, 0, 1]), 0.5, row)
     seen = Measurement.allocate(nq=8, nv=7, n=1, contacts=2)
     seen.data[:] = row
     assert seen.time == 0.5

@@ -15,7 +15,6 @@ from sealag.simulation import (
     Foot,
     Network,
     Outcome,
-    Plant,
     Push,
     Scene,
     closed_loop,

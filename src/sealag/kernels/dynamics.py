@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sealag.constants import GRAVITY
 from sealag.kernels._jit import entry, inner
 from sealag.kernels.spatial import (
     add,
@@ -32,7 +33,6 @@ from sealag.kernels.spatial import (
 )
 from sealag.typing import Array, IntArray
 
-GRAVITY = 9.81  # m/s², as in Pinocchio's models
 REVOLUTE, PRISMATIC, FREE = 0, 1, 2
 KINETIC, POTENTIAL = 0, 1  # places in Terms.energy
 

@@ -4,10 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sealag.constants import GRAVITY
 from sealag.kernels._jit import entry, inner
 from sealag.typing import Array
-
-GRAVITY = 9.81
 
 
 @entry

@@ -327,7 +327,7 @@ class _Loop:
         while True:
             why, plant.time, cursor = self._enter(cursor, self._periods, self._said)
             time, step, event, part = cursor
-            if progress is not None and step >= shown:
+            if progress is not None and step > shown:  # what was there then is logged
                 progress(plant.time)
                 shown = step - step % every + every
             if why == kernel.END:
