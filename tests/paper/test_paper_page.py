@@ -20,6 +20,8 @@ from humanoids2016 import (
 )
 from sealag.design import load, resolve_project
 
+pytestmark = pytest.mark.slow
+
 
 class Links(HTMLParser):
     def __init__(self):

@@ -12,6 +12,8 @@ from sealag.margin import delay_margin
 from sealag.passivity import max_delay_from_stiffness
 from sealag.simulation import Clock, Network, Outcome, Push, Scene, closed_loop
 
+pytestmark = pytest.mark.slow
+
 
 # Constant delay ----------------------------------------------------------------------------------
 def _split(delay, count, up):

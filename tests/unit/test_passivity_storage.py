@@ -1,4 +1,4 @@
-"""Stored energy falls below the bound and rises beyond it, on one-joint plants of THEORY 6b."""
+"""Stored energy falls below the bound and rises beyond it: docs/theory section 6, one joint."""
 
 import numpy as np
 import pytest

@@ -10,6 +10,7 @@ import pytest
 import sealag
 import sealag.passivity
 from helpers.certificates import failures, made, plain, resealed
+from helpers.designs import EXAMPLES
 from sealag.errors import CertificateError, InputError
 from sealag.passivity import Criterion, verify, write_certificate
 from sealag.passivity._definite import doubles, positive_complement, positive_definite, rationals
@@ -224,7 +225,7 @@ def test_unreadable_certificates_are_named(tmp_path):
 
 
 def test_a_certificate_has_no_truth_value():
-    certificate = sealag.certify(sealag.load("examples/baxter.toml"))
+    certificate = sealag.certify(sealag.load(EXAMPLES / "baxter.toml"))
     with pytest.raises(TypeError, match="status"):
         bool(certificate)
     assert plain(certificate)["hashes"]["content"] != certificate.hashes["project"]
@@ -269,7 +270,7 @@ def test_infinite_bounds_are_certified_without_numbers(criterion):
     """A design whose tasks have no stiffness tolerates any delay."""
     from dataclasses import replace
 
-    system = sealag.load("examples/baxter.toml")
+    system = sealag.load(EXAMPLES / "baxter.toml")
     tasks = tuple(replace(task, stiffness=0.0 * task.stiffness) for task in system.law.tasks)
     system = replace(system, law=replace(system.law, tasks=tasks, gravity="planned"))
     data = plain(sealag.certify(system, criterion=criterion))

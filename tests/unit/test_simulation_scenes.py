@@ -9,25 +9,20 @@ from helpers.controllers import JointPD
 from sealag.actuation import actuators
 from sealag.delay import Constant, Link
 from sealag.errors import ContractionError, InputError, SolverError, UnknownNameError
-from sealag.robot import Contact, ContactKind, load_robot
+from sealag.robot import Contact, ContactKind
 from sealag.simulation import (
     Clock,
     Foot,
     Network,
     Outcome,
+    Plant,
     Push,
     Scene,
     closed_loop,
 )
-from sealag.simulation._plant import Plant
 from sealag.walking import GroundProfile
 
 FEET = ("left_foot", "right_foot")
-
-
-@pytest.fixture(scope="module")
-def hume():
-    return load_robot("bundled:hume.urdf", floating_base=True)
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""How well the spring torque follows its command: the price of damping (THEORY section 9)."""
+"""How well the spring torque follows its command: the price of damping (docs/theory section 9)."""
 
 from dataclasses import dataclass
 

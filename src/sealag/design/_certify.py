@@ -61,7 +61,7 @@ def certify(
     Args:
         system: the design.
         motion: the motion; the system's posture if None.
-        criterion: certified (THEORY section 6) or published ((29), (31) as printed); the
+        criterion: certified (docs/theory section 6) or published ((29), (31) as printed); the
             system's own if None.
         time_varying: also bound the delay for matrices that move inside polytopes around the
             motion (about a second more); criterion certified only.

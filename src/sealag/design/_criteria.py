@@ -1,4 +1,4 @@
-"""The two criteria along a motion: certified (THEORY section 6) and published ((29), (31))."""
+"""The two criteria along a motion: certified (docs/theory section 6) and published ((29), (31))."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ class Bounds:
 def certified_bounds(
     spaces: Spaces, system: System, rest: Rest | None = None, motion: Motion | None = None
 ) -> Bounds:
-    """Bound of THEORY section 6 for the law that is run.
+    """Bound of docs/theory section 6 for the law that is run.
 
     Sufficient for a passive controller side along the frozen motion: the signal is one that a
     potential can belong to, the drives are ideal, the motors carry the static load, no direction is
@@ -138,7 +138,7 @@ def _refusals(
 
 
 def _drive_refusals(system: System) -> Iterator[str]:
-    """Why drives that are late are covered by no passive bound (THEORY section 14)."""
+    """Why drives that are late are covered by no passive bound (docs/theory section 14)."""
     slow = np.flatnonzero(np.isfinite(system.actuators.torque_bandwidth))
     if len(slow):
         joint, rate = system.robot.joints[slow[0]], system.actuators.torque_bandwidth[slow[0]]

@@ -94,7 +94,7 @@ def delay_margin(
     horizon: float | None = None,
     confirm: bool = False,
 ) -> DelayMargin:
-    """Exact margin of ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e) for constant d (THEORY section 7).
+    """Exact margin of ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e), constant d; docs/theory section 7.
 
     A root jω with z = e^{-jωd} solves det(jω − A_0 − z A_1 − A_e e^{-jωe}) = 0. Without A_e the
     eigenvalues of A_0 + e^{-jφ} A_1 are enclosed over half a turn φ; with it those of

@@ -50,9 +50,9 @@ def max_delay(
     """Largest delay of Theorem 1 (29), d = 1 / w(D^-½ J*ᵀ S J* D^-½), in closed form.
 
     w is the numerical radius; the value is the supremum over all multipliers Q ≻ 0, for any m, n
-    and rank of J* (Ando's theorem; THEORY section 5). With `form="published"`, S = Λ K_x and this
-    is the criterion as printed; it is sufficient for a passive loop only where S is symmetric
-    and x(θ) is what is fed back (THEORY section 6).
+    and rank of J* (Ando's theorem; docs/theory section 5). With `form="published"`, S = Λ K_x and
+    this is the criterion as printed; it is sufficient for a passive loop only where S is symmetric
+    and x(θ) is what is fed back (docs/theory section 6).
 
     Args:
         J_star: (…, m, n) contact-consistent Jacobian J*.
@@ -79,8 +79,8 @@ def max_delay_from_stiffness(
 ) -> DelayBound:
     """Largest delay for a delayed motor-side stiffness F, d = 1 / w(D^-½ F D^-½).
 
-    The certified criterion of THEORY section 6 when F = −∂τ_osc/∂θ is the whole stiffness of the
-    law that is run and is symmetric.
+    The certified criterion of docs/theory section 6 when F = −∂τ_osc/∂θ is the whole stiffness of
+    the law that is run and is symmetric.
 
     Args:
         F: (…, n, n) Nm/rad.

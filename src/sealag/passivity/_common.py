@@ -101,7 +101,7 @@ def max_delay_common_from_stiffness(
 ) -> CommonBound:
     """Largest delay with one multiplier in joint coordinates for all delayed stiffnesses F_t.
 
-    The certified criterion of THEORY section 6 with V_4 = ½ ∫∫ θ̇ᵀ Q θ̇ and a constant Q (n, n);
+    The certified criterion of docs/theory section 6 with V_4 = ½ ∫∫ θ̇ᵀ Q θ̇ and a constant Q (n, n);
     what holds at the instants holds on the straight lines between them.
 
     Args:
