@@ -5,7 +5,7 @@ import pytest
 
 from helpers.mimics import MIMICS, joint, link, robot
 from sealag.errors import RobotError, SealagError, UnknownNameError
-from sealag.robot import Contact, example_robot_path, load_robot
+from sealag.robot import Contact, load_robot
 
 ARM = (link("base"), link("a"), link("b"), joint("j", "base", "a"), joint("k", "a", "b"))
 
@@ -105,7 +105,7 @@ def test_what_can_be_is_read(name, tmp_path):
      "bolt_description/robots/bolt.urdf", "icub_description/robots/icub_reduced.urdf"],
 )  # fmt: skip
 def test_placeholders_of_public_robots_are_no_reason(path):
-    assert load_robot(example_robot_path(path), floating_base=True).n > 0
+    assert load_robot(f"example-robot-data:{path}", floating_base=True).n > 0
 
 
 def test_a_link_goes_before_a_joint_of_its_name(tmp_path):

@@ -1,4 +1,4 @@
-"""Walking with springs and delay: whole-body law, weight transfer, steps, all at one tick."""
+"""The walking controller: whole-body law, weight transfer, steps and command at each tick."""
 
 import math
 from dataclasses import dataclass
@@ -186,7 +186,7 @@ class WalkingController:
             self._estimator.tau_sea[:] = measurement.tau_sea
 
     def _switch(self, now: float, contact: Array) -> None:
-        """Begin the next step when planned, or when the swing foot is seen on the ground."""
+        """Begin the next step as planned, or at an early touchdown of the swing foot."""
         step, gait = self.step, self.gait
         late = step.phase(now) > _LATE_SWING * gait.step_time + 0.4 * gait.transfer_time
         touched = self.options.early_contact and late and contact[step.swing_foot] > 0.0
