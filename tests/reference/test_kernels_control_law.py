@@ -9,15 +9,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from helpers.kernels import from_python, newton_of, solve_space, space_of
-from sealag.kernels import control_law
+from sealag.kernels import control_law, task_error
 from sealag.kernels.operational_space import SYMMETRIC
 from sealag.robot import Contact, load_robot
 from sealag.whole_body import GravityCompensation, Law, Task, TaskKind
 from sealag.whole_body._evaluation import LawEvaluation
 
-frame_error = from_python(control_law.frame_error)
+frame_error = from_python(task_error.frame_error)
 gravity_slope = from_python(control_law.gravity_slope)
-leave_to_higher = control_law.leave_to_higher
+leave_to_higher = task_error.leave_to_higher
 static_step = from_python(control_law.static_step)
 CONTACTS = (Contact(frame="left_foot"), Contact(frame="right_foot"))
 GAINS = np.array([100.0, 120.0, 90.0, 60.0, 50.0, 40.0, 30.0])

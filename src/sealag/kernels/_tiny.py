@@ -13,6 +13,8 @@ from sealag.kernels import (
     numerical_radius,
     operational_space,
     plant,
+    run,
+    task_error,
     walking,
     walking_law,
     walking_state,
@@ -116,7 +118,7 @@ def _tick() -> None:
     )  # fmt: skip
     out = one.copy()
     control_law.tick(raw, tuple(signal), 1e-3, q, one, out)
-    control_law.leave_to_higher(at.J_t, np.zeros((1, nv)), tasks.levels, out, np.zeros(nv))
+    task_error.leave_to_higher(at.J_t, np.zeros((1, nv)), tasks.levels, out, np.zeros(nv))
 
 
 def _plant() -> tuple[Any, ...]:
@@ -158,28 +160,28 @@ def _step() -> None:
 
 def _glide(raw: Any, raw_terms: Any, instants: Any, books: Any) -> None:
     one, none = np.zeros(1), np.zeros(0, np.int64)
-    channels = plant.Channels(
+    channels = run.Channels(
         due=np.zeros(0), kind=none, tick=none, samples=np.zeros((1, 20)), commands=np.zeros((1, 1)),
         sent=one, acting=one, acting_tick=np.zeros(1, np.int64), torque_known=np.zeros(0),
         torque_history=np.zeros((1, 1)), torque_held=one, storage=one, tank=one,
         undelayed_work=one,
     )  # fmt: skip
-    periods = plant.Periods(step=1e-3, steps=0, log=1, watch=1, torque=1, torque_period=1e-3)
-    limits = plant.Limits(deflection=1.0, speed=1.0, height=-1.0, tilt=-1.0, up=np.zeros((1, 3)))
+    periods = run.Periods(step=1e-3, steps=0, log=1, watch=1, torque=1, torque_period=1e-3)
+    limits = run.Limits(deflection=1.0, speed=1.0, height=-1.0, tilt=-1.0, up=np.zeros((1, 3)))
     now = contact.Instant(*instants[0])
     shapes = {
         "q": now.q.shape, "v": now.v.shape, "contact_force": (1, 3), "stores": (4,),
         "joint": (9, 1), "scalar": (5,), "time": (), "tick": (), "moved": (), "storage": (),
         "tank": (),
     }  # fmt: skip
-    log = plant.Log(
+    log = run.Log(
         **{
-            name: np.zeros((1, *shapes.get(name, (1,))), np.int64 if name in plant.WHOLE else float)
-            for name in plant.Log._fields
+            name: np.zeros((1, *shapes.get(name, (1,))), np.int64 if name in run.WHOLE else float)
+            for name in run.Log._fields
         }
     )
-    run = tuple(channels), tuple(periods), tuple(limits), True
-    plant.glide(raw, raw_terms, instants, books, run, tuple(log), (0.0, 0, 0, plant.WATCH), 1.0)
+    whole = tuple(channels), tuple(periods), tuple(limits), True
+    run.glide(raw, raw_terms, instants, books, whole, tuple(log), (0.0, 0, 0, run.WATCH), 1.0)
 
 
 def _walk() -> None:

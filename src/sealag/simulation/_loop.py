@@ -11,12 +11,13 @@ from sealag.errors import InputError, SealagError, SolverError
 from sealag.robot import Robot
 from sealag.simulation._audit import Stated, UndelayedWork, audit
 from sealag.simulation._exchange import Exchanges
+from sealag.simulation._memory import allocate_log, events_of, open_channels
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.simulation._plant import FASTEST, Plant
-from sealag.simulation._run import Run, refuse_large
+from sealag.simulation._run import Run
 from sealag.simulation._scene import Scene
-from sealag.typing import Array, IntArray
+from sealag.typing import Array
 from sealag.whole_body import (
     Measurement,
     StoringController,
@@ -25,7 +26,7 @@ from sealag.whole_body import (
 )
 
 if TYPE_CHECKING:
-    from sealag.kernels.plant import Channels, Limits, Log, Periods
+    from sealag.kernels.run import Limits, Periods
 
 _WATCH = 5e-3  # s between two looks for a fall
 _AT_REST = 1e-12  # rad: how far the first motor angles may be from rest
@@ -114,11 +115,11 @@ class _Loop:
         scene: Scene,
         seed: int,
     ) -> None:
-        from sealag.kernels import plant
+        from sealag.kernels import run
 
         frames = list(dict.fromkeys(push.frame for push in scene.pushes))
         self.robot, self.controller, self.clock, self.scene = robot, controller, clock, scene
-        self.seed, self._network, self._kernel = seed, network, plant
+        self.seed, self._network, self._kernel = seed, network, run
         self.plant = Plant(
             robot,
             actuators,
@@ -187,21 +188,8 @@ class _Loop:
     def _plan(self, steps: int, every: int) -> None:
         """Lay out all that happens: loads, samples, ticks and takings, and what is logged."""
         kernel, step = self._kernel, self.clock.physics
-        ways = Exchanges.plan(
-            self._network, self.clock, duration=steps * step, seed=self.seed
-        )  # fmt: skip
+        ways = Exchanges.plan(self._network, self.clock, duration=steps * step, seed=self.seed)
         self.exchanges = ways
-        edges = [t for push in self.scene.pushes for t in (push.start, push.start + push.duration)]
-        edges = np.unique(edges)
-        numbers = np.arange(len(ways.tick))
-        parts = (
-            (edges, kernel.LOAD, np.zeros(len(edges))), (ways.seen, kernel.SAMPLE, numbers),
-            (ways.tick, kernel.TICK, numbers), (ways.taken, kernel.TAKE, ways.command),
-        )  # fmt: skip
-        time = np.concatenate([at for at, _, _ in parts])
-        kind = np.concatenate([np.full(len(at), kind) for at, kind, _ in parts]).astype(np.int64)
-        tick = np.concatenate([number for _, _, number in parts]).astype(np.int64)
-        order = np.lexsort((kind, time))
         self._periods = kernel.Periods(
             step=step,
             steps=steps,
@@ -210,56 +198,13 @@ class _Loop:
             torque=self.clock.steps_of("embedded", self.clock.embedded or step),
             torque_period=self.clock.embedded or step,
         )
-        self._channels = self._open(time[order], kind[order], tick[order])
-        self._log = self._allocate(-(-steps // every) + 1)
+        self._channels = open_channels(
+            ways, events_of(ways, self.scene.pushes), self._periods.torque_period,
+            first=self.first, torque=self.plant.now.tau_sea, row=self.truth.data.size,
+            work=self._given.work,
+        )  # fmt: skip
+        self._log = allocate_log(self.plant, -(-steps // every) + 1)
         self._raw = tuple(map(tuple, (self._channels, self._limits, self._log)))
-
-    def _open(self, due: Array, kind: IntArray, tick: IntArray) -> "Channels":
-        """Allocate what is on its way, as much as there ever is at once."""
-        ways, n = self.exchanges, self.robot.n
-        # How many ticks a command may lie before the drives take it, and a sample before a tick.
-        issued = np.searchsorted(ways.tick, ways.taken, "right")
-        depth = int((issued - ways.command).max(initial=0)) + 1
-        first = np.minimum.accumulate(ways.seen[::-1])[::-1]
-        waiting = np.searchsorted(first, ways.tick, "right") - np.arange(len(ways.tick))
-        known, late = np.zeros(0) if ways.torque is None else ways.torque, 0.0
-        if len(known):
-            period = self._periods.torque_period
-            late = float((period * np.arange(len(known)) - known).max() / period)
-        return self._kernel.Channels(
-            due=due,
-            kind=kind,
-            tick=tick,
-            samples=np.zeros((int(waiting.max(initial=0)) + 1, self.truth.data.size)),
-            commands=np.zeros((depth, n)),
-            sent=self.first.copy(),
-            acting=self.first.copy(),
-            acting_tick=np.full(1, -1),
-            torque_known=known,
-            torque_history=np.tile(self.plant.now.tau_sea, (math.ceil(late) + 2, 1)),
-            torque_held=np.zeros(n),
-            storage=np.zeros(1),
-            tank=np.zeros(1),
-            undelayed_work=self._given.work,
-        )
-
-    def _allocate(self, rows: int) -> "Log":
-        robot, plant = self.robot, self.plant
-        n, points, ledger = robot.n, plant.surroundings.count, plant.ledger
-        shapes = {
-            "time": (), "tick": (), "q": (robot.nq,), "v": (robot.nv,),
-            "contact_force": (points, 3), "contact_mode": (points,),
-            "stores": ledger.stores.shape, "joint": ledger.joint.shape,
-            "scalar": ledger.scalar.shape, "moved": (), "storage": (), "tank": (),
-        }  # fmt: skip
-        log = {name: shapes.get(name, (n,)) for name in self._kernel.Log._fields}
-        refuse_large(rows, sum(math.prod(shape) for shape in log.values()))
-        arrays = {
-            name: np.zeros((rows, *shape), np.int64 if name in self._kernel.WHOLE else float)
-            for name, shape in log.items()
-        }
-        arrays["time"][:] = np.nan
-        return self._kernel.Log(**arrays)
 
     def _fall_limits(self) -> "Limits":
         fall, height, tilt, up = self.scene.fall, -math.inf, -math.inf, np.zeros((1, 3))
@@ -339,14 +284,11 @@ class _Loop:
             elif why == kernel.BLOCKED:
                 plant.advance(time, channels.acting, channels.torque_held)
             else:
-                self._happen(event)
                 cursor = (time, step, event + 1, part)
-
-    def _happen(self, event: int) -> None:
-        if self._channels.kind[event] == self._kernel.TICK:
-            self._tick(int(self._channels.tick[event]))
-        else:
-            self._load()
+                if channels.kind[event] == kernel.TICK:
+                    self._tick(int(channels.tick[event]))
+                else:
+                    self._load()
 
     @staticmethod
     def _ask(question: Callable[..., Any], *arguments: Any) -> Any:
@@ -442,19 +384,15 @@ class _Loop:
                 theta_dot=log.theta_dot,
                 shaped_inertia=actuators.shaped_inertia,
                 ratio=actuators.rotor_inertia / actuators.shaped_inertia,
-                stated=self._stated(log),
+                stated=None
+                if self._storing is None
+                else Stated(
+                    storage=log.storage,
+                    tank=log.tank if log.tank.any() else None,
+                    work=log.undelayed_work,
+                    rough=self._given.rough,
+                ),
             ),
-        )
-
-    def _stated(self, log: "Log") -> Stated | None:
-        """What the controller said about itself, if it does."""
-        if self._storing is None:
-            return None
-        return Stated(
-            storage=log.storage,
-            tank=log.tank if log.tank.any() else None,
-            work=log.undelayed_work,
-            rough=self._given.rough,
         )
 
 

@@ -221,10 +221,10 @@ class LawEvaluation:
 
     def leave_to_higher(self, rate: Array) -> None:
         """Project the rates (m,) of the tasks into the null space of the higher tasks, in place."""
+        from sealag.kernels.task_error import leave_to_higher
+
         if len(self._levels) > 2:
-            self._kernel.leave_to_higher(
-                self._at.J_t, self.space.lift, self._levels, rate, self._at.shift
-            )
+            leave_to_higher(self._at.J_t, self.space.lift, self._levels, rate, self._at.shift)
 
     def static(self, q: Array, theta: Array, sag: Array, iterations: int, out: Array) -> None:
         """Evaluate at q̄(θ) of Eqs. (15), (16), by Newton's method from a sag q̄ − θ, moved.

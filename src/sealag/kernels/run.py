@@ -1,0 +1,262 @@
+"""What passes between two ticks of the controller, in one call.
+
+`glide` does step after step, with samples, commands, torque feedback and the log, until something
+needs Python: a tick, another load, a change of contact.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sealag.kernels import spatial
+from sealag.kernels._jit import entry, inner
+from sealag.kernels.contact import (
+    ground_height,
+    measure_gaps,
+    smallest_margin,
+    write_measurement,
+)
+from sealag.kernels.dynamics import KINETIC
+from sealag.kernels.ledger import Ledger
+from sealag.kernels.linalg import copy
+from sealag.kernels.motor import Held
+from sealag.kernels.plant import MARGIN, SAME, accept, allocate_step, take_step, unpack
+from sealag.typing import Array, IntArray
+
+LOAD, SAMPLE, TICK, TAKE = range(4)  # kinds of events, in their order at one instant
+WATCH, EVENTS, CLOSE, MOVE, INSIDE = range(5)
+"""What comes next in a run: at a step's beginning watch, let events happen, close the instant
+(torque feedback and log), move; inside a step only events."""
+END, FALLEN, EVENT, STATE, BLOCKED = range(5)  # why `glide` returns
+
+
+class Channels(NamedTuple):
+    """What happens when in a run, and what is on its way."""
+
+    due: Array  # (E,) instants of events, s, increasing
+    kind: IntArray  # (E,) LOAD, SAMPLE, TICK or TAKE
+    tick: IntArray  # (E,) whose sample, or whose command
+    samples: Array  # (R, row) measurements that are on their way, at their tick modulo R
+    commands: Array  # (R, n) commands that are on their way, likewise
+    sent: Array  # (n,) the last command, Nm
+    acting: Array  # (n,) command that the drives obey, Nm
+    acting_tick: IntArray  # (1,) its tick; -1 for the first command
+    torque_known: Array  # (L,) instant of the spring torque that the drives know; empty if now's
+    torque_history: Array  # (H, n) spring torques at the last looks, Nm
+    torque_held: Array  # (n,) the one that they know, Nm
+    storage: Array  # (1,) that the controller states, J
+    tank: Array  # (1,) energy in its tank, J
+    undelayed_work: Array  # (n,) of the command that it would give without delay, J
+
+
+class Periods(NamedTuple):
+    """Lengths of a run."""
+
+    step: float  # of the physics, s
+    steps: int  # how many of them
+    log: int  # steps from one logged instant to the next
+    watch: int  # steps from one look for a fall to the next
+    torque: int  # steps from one look for spring torque to the next
+    torque_period: float  # the same in s
+
+
+class Log(NamedTuple):
+    """Logged instants, one a row."""
+
+    time: Array  # (N,) s
+    tick: IntArray  # (N,) of the command that acts
+    q: Array  # (N, nq)
+    v: Array  # (N, nv)
+    theta: Array  # (N, n)
+    theta_dot: Array  # (N, n)
+    tau_motor: Array  # (N, n)
+    tau_sea: Array  # (N, n)
+    tau_command: Array  # (N, n)
+    tau_osc: Array  # (N, n)
+    contact_force: Array  # (N, P, 3)
+    contact_mode: IntArray  # (N, P) 0 open, 1 sticking, 2 slipping
+    stores: Array  # (N, 4)
+    joint: Array  # (N, 9, n)
+    scalar: Array  # (N, 5)
+    moved: Array  # (N,)
+    storage: Array  # (N,)
+    tank: Array  # (N,)
+    undelayed_work: Array  # (N, n)
+
+
+WHOLE = ("tick", "contact_mode")  # columns of the log that are whole numbers
+
+
+class Limits(NamedTuple):
+    """When a run has left what it is about."""
+
+    deflection: float  # rad: a spring deflection beyond any physical range
+    speed: float  # rad/s, m/s: a velocity likewise
+    height: float  # m above the ground, of the base; -inf if nothing counts as a fall
+    tilt: float  # cosine of the base's largest tilt
+    up: Array  # (1, 3) where its z axis points at the start
+
+
+@inner
+def _lost(plant, now, limits):
+    """Whether the robot has fallen or left any physical range."""
+    n, contacts = now.theta.size, plant.contacts
+    for j in range(n):
+        if not abs(now.theta[j] - now.q[now.q.size - n + j]) < limits.deflection:
+            return True
+    for i in range(now.v.size):
+        if not abs(now.v[i]) < limits.speed:
+            return True
+    if limits.height == -np.inf:
+        return False
+    _, _, z_axis = spatial.transpose(spatial.rotation_of(now.q[3], now.q[4], now.q[5], now.q[6]))
+    height = now.q[2] - ground_height(contacts, now.q[0])
+    return height < limits.height or spatial.dot(z_axis, spatial.vector(limits.up, 0)) < limits.tilt
+
+
+@inner
+def _feed_torque(channels, periods, look, now):
+    """Give the drives the spring torque that reaches their torque feedback now."""
+    history, size = channels.torque_history, channels.torque_history.shape[0]
+    copy(now.tau_sea, history[look % size])
+    place = channels.torque_known[look] / periods.torque_period
+    before = int(place + SAME)
+    part, after = max(0.0, place - before), min(before + 1, look)
+    for j in range(now.tau_sea.size):
+        earlier = history[before % size, j]
+        channels.torque_held[j] = earlier + part * (history[after % size, j] - earlier)
+
+
+@inner
+def _record(plant, channels, now, time, ledger, log, row):
+    """Write a row of the log."""
+    contacts = plant.contacts
+    log.time[row], log.tick[row] = time, channels.acting_tick[0]
+    copy(now.q, log.q[row])
+    copy(now.v, log.v[row])
+    copy(now.theta, log.theta[row])
+    copy(now.theta_dot, log.theta_dot[row])
+    copy(now.tau_motor, log.tau_motor[row])
+    copy(now.tau_sea, log.tau_sea[row])
+    copy(channels.sent, log.tau_command[row])
+    copy(channels.acting, log.tau_osc[row])
+    copy(channels.undelayed_work, log.undelayed_work[row])
+    copy(now.force, log.contact_force[row])
+    copy(ledger.stores, log.stores[row])
+    copy(ledger.joint, log.joint[row])
+    copy(ledger.scalar, log.scalar[row])
+    log.storage[row], log.tank[row] = channels.storage[0], channels.tank[0]
+    for i in range(contacts.closed.size):
+        slipping = 1 if contacts.yielding[i] > 0.0 else 0
+        log.contact_mode[row, i] = contacts.closed[i] * (1 + slipping)
+    log.moved[row] = ledger.moved[0]
+
+
+@inner
+def _happen(plant, channels, now, event):
+    """Let an event happen; False if it needs Python."""
+    tick = channels.tick[event]
+    if channels.kind[event] == SAMPLE:
+        row = channels.samples[tick % channels.samples.shape[0]]
+        contacts = plant.contacts
+        write_measurement(now, contacts.closed, contacts.frame, channels.due[event], row)
+    elif channels.kind[event] == TAKE:
+        copy(channels.commands[tick % channels.commands.shape[0]], channels.acting)
+        channels.acting_tick[0] = tick
+    else:
+        return False
+    return True
+
+
+@inner
+def _slide(plant, work, now, held, step, memory, following):
+    """Try a step in which no contact changes; False, with all as it was, if one does."""
+    contacts = plant.contacts
+    before = contacts.yielding.copy()
+    if take_step(plant, work, now, held, step, memory, following) and np.isfinite(
+        following.energy[KINETIC]
+    ):
+        measure_gaps(contacts, following)
+        smallest, _ = smallest_margin(
+            contacts.C, contacts.closed, contacts.weight, following.force, following.gap,
+            following.velocity,
+        )  # fmt: skip
+        if smallest >= -MARGIN:
+            return True
+    copy(before, contacts.yielding)
+    return False
+
+
+class Cursor(NamedTuple):
+    """Where a run is."""
+
+    time: float  # s
+    step: int  # the physics step that begins, or is under way
+    event: int  # the next event
+    part: int  # WATCH, EVENTS, CLOSE, MOVE or INSIDE
+
+
+@entry
+def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, cursor, said):
+    """Go on with a run until something needs Python.
+
+    Args:
+        raw_plant: the plant.
+        raw_terms: scratch.
+        raw_instants: the present instant, and scratch for the next.
+        raw_ledger: the books.
+        raw_run: `Channels`, `Periods` and `Limits`, and whether torque feedback is not delayed.
+        raw_log: the log.
+        cursor: raw `Cursor`.
+        said: instant at which the controller last stated its storage, s; inf if it states none.
+
+    Returns:
+        END; FALLEN if `Limits` are left; EVENT if an event needs Python, whose part it is to count
+        it; STATE if the controller must state its storage for the log; BLOCKED if a step needs
+        Python. The present instant, s. And the raw `Cursor`, that of BLOCKED behind the step.
+    """
+    plant, work, now, following, ledger = unpack(raw_plant, raw_terms, raw_instants, raw_ledger)
+    raw_channels, raw_periods, raw_limits, instant = raw_run
+    channels, periods, limits = Channels(*raw_channels), Periods(*raw_periods), Limits(*raw_limits)
+    n, log = now.theta.size, Log(*raw_log)
+    gained = Ledger(np.empty((9, n)), np.empty(5), np.empty(4), np.empty(1))
+    memory = allocate_step(now.v.size, gained)
+    held = Held(channels.acting, channels.torque_held, instant)
+    at, same = Cursor(*cursor), SAME * periods.step
+    time, step, event, part = at.time, at.step, at.event, at.part
+    profiled = plant.contacts.ground_x.size > 0 or plant.contacts.closed.size == 0
+    while True:
+        if part == WATCH:
+            part = EVENTS
+            if step % periods.watch == 0 and (not profiled or _lost(plant, now, limits)):
+                return FALLEN, time, (time, step, event, part)
+        if part in (EVENTS, INSIDE):
+            while event < channels.due.size and channels.due[event] <= time + same:
+                if not _happen(plant, channels, now, event):
+                    return EVENT, time, (time, step, event, part)
+                event += 1
+            part = CLOSE if part == EVENTS else MOVE
+        if part == CLOSE:
+            logged = step % periods.log == 0 or step == periods.steps
+            if logged and said != np.inf and said != time:
+                return STATE, time, (time, step, event, part)
+            if channels.torque_known.size > 0 and step % periods.torque == 0:
+                _feed_torque(channels, periods, step // periods.torque, now)
+            if logged:
+                row = (step + periods.log - 1) // periods.log
+                _record(plant, channels, now, time, ledger, log, row)
+            if step == periods.steps:
+                return END, time, (time, step, event, part)
+            part = MOVE
+        begin, end = time, (step + 1) * periods.step
+        time, part = end, WATCH
+        if event < channels.due.size and channels.due[event] < end - same:
+            time, part = channels.due[event], INSIDE
+        else:
+            step += 1
+        span = time - begin
+        if abs(span - periods.step) <= same:
+            span = periods.step
+        if not (profiled and _slide(plant, work, now, held, span, memory, following)):
+            return BLOCKED, begin, (time, step, event, part)
+        accept(plant.motors, following, now, gained, ledger)
