@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any, Required, TypedDict, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.simulation._plant import FASTEST, Plant
 from sealag.simulation._run import Log, Run
 from sealag.simulation._scene import Scene
+from sealag.simulation._start import Start
 from sealag.typing import Array
 from sealag.whole_body import (
     Measurement,
@@ -32,23 +33,6 @@ _SCALARS = ("time", "measurement_age", "command_age", "storage", "tank")
 _LONGEST = 100.0  # rad: a spring deflection beyond any physical range
 _BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError)  # arithmetic that has no answer
 _MAY_BE_NUMERICAL = (Outcome.DIVERGED, Outcome.CONTACT_UNSOLVABLE, Outcome.CHATTERED)
-
-
-class Start(TypedDict, total=False):
-    """The first state of a run.
-
-    Attributes:
-        q: Configuration (nq,); needed.
-        v: Velocity (nv,); at rest if not given.
-        theta: Motor angles (n,), rad; such that the springs carry the controller's first command
-            if not given.
-        theta_dot: Motor speeds (n,), rad/s; the joint rates if not given.
-    """
-
-    q: Required[Array]
-    v: Array | None
-    theta: Array | None
-    theta_dot: Array | None
 
 
 def closed_loop(
