@@ -2,12 +2,7 @@
 
 from sealag.design._assumptions import assumptions_of
 from sealag.design._certify import certify, check_question
-from sealag.design._criteria import (
-    ASYMMETRY_TOLERANCE,
-    Bounds,
-    certified_bounds,
-    published_bounds,
-)
+from sealag.design._criteria import certified_bounds, published_bounds
 from sealag.design._local import Local, local_of, margin_of
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
@@ -19,8 +14,6 @@ from sealag.design._system import Source, System
 from sealag.design._walking import Walking
 
 __all__ = [
-    "ASYMMETRY_TOLERANCE",
-    "Bounds",
     "Local",
     "LocalMargins",
     "Source",

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.design._criteria import ASYMMETRY_TOLERANCE, Bounds
+from sealag.design._criteria import ASYMMETRY_TOLERANCE
 from sealag.design._system import System
 from sealag.errors import ContractionError, SolverError
 from sealag.margin import DelayMargin, delay_margin
-from sealag.passivity import Basis, Place
+from sealag.passivity import Basis, LocalLoop, Place
 from sealag.robot import Motion
 from sealag.typing import Array
 from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, Spaces, sea_loop
@@ -87,6 +87,24 @@ class Local:
             return None
         return float(self.margin.first_crossing)
 
+    def stated_loop(self) -> LocalLoop | None:
+        """Return the frozen loop of the critical instant as a certificate states it."""
+        loop, margin = self.loop, self.margin
+        if loop is None:
+            return None
+        crosses = margin is not None and np.isfinite(margin.frequency)
+        late = bool(loop.A_e.any()) and loop.embedded_delay > 0.0
+        return LocalLoop(
+            states=tuple(loop.states),
+            A_0=loop.A_0 if late else loop.A_0 + loop.A_e,
+            A_1=loop.A_1,
+            A_e=loop.A_e if late else None,
+            embedded_delay_s=loop.embedded_delay if late else 0.0,
+            symmetries=loop.symmetries / np.linalg.norm(loop.symmetries, axis=0),
+            at=self.at,
+            frequency_rad_s=float(margin.frequency) if margin is not None and crosses else None,
+        )
+
     def undercut(self, bounds: Array) -> list[int]:
         """Return the instants whose exact margin lies below their bound.
 
@@ -109,7 +127,7 @@ class Local:
 
 
 def local_of(
-    system: System, motion: Motion, spaces: Spaces, bounds: Bounds, rest: Rest | None = None
+    system: System, motion: Motion, spaces: Spaces, bounds: Array, rest: Rest | None = None
 ) -> Local:
     """Decide stability and margin of the law that runs at every instant of a motion.
 
@@ -126,7 +144,7 @@ def local_of(
         system: the design.
         motion: its instants.
         spaces: the law's matrices along it.
-        bounds: of the certified criterion.
+        bounds: (N,) of the certified criterion, s; 0 where it decides nothing.
         rest: where the loop of the first instant rests, if that is known already.
     """
     return _Decision(system, motion, spaces, bounds, rest).run()
@@ -166,7 +184,7 @@ class _Decision:
         system: System,
         motion: Motion,
         spaces: Spaces,
-        bounds: Bounds,
+        bounds: Array,
         first: Rest | None,
     ) -> None:
         self._system, self._motion, self._spaces, self._bounds = system, motion, spaces, bounds
@@ -182,14 +200,14 @@ class _Decision:
             if self._decide(int(k)) and count > _FEW:
                 break
         for k in minima:
-            delay = float(self._bounds.delay[k])
+            delay = float(self._bounds[k])
             self._found[k] = InstantMargin(basis=Basis.BOUND, delay=delay)
-        for k in sorted(minima, key=lambda at: float(self._bounds.delay[at])):
-            if self._best is not None and self._bounds.delay[k] >= self._least():
+        for k in sorted(minima, key=lambda at: float(self._bounds[at])):
+            if self._best is not None and self._bounds[k] >= self._least():
                 break
             self._search(k, minima[k])
         if self._best is None:  # no search came to an end
-            self._decide(min(minima, key=lambda at: float(self._bounds.delay[at])))
+            self._decide(min(minima, key=lambda at: float(self._bounds[at])))
         assert self._best is not None
         return Local(
             instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
@@ -261,7 +279,7 @@ class _Decision:
     def _minima(self) -> dict[int, FreeLinks]:
         """Links at the instants that a potential decides: stable, with a margin above the bound."""
         system, spaces = self._system, self._spaces
-        good = (self._bounds.delay > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
+        good = (self._bounds > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
         if not (system.law.rests_at_posture and system.ideal_drives):
             return {}
         plants = [LinkPlant(system.robot, contacts) for contacts in self._motion.contact_sets]

@@ -97,7 +97,8 @@ def local_margins(
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
     motion = system.still() if motion is None else motion
     spaces = system.spaces(motion)
-    local = local_of(system, motion, spaces, certified_bounds(spaces, system, None, motion))
+    bounds = certified_bounds(spaces, system, None, motion).delay
+    local = local_of(system, motion, spaces, bounds)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
         raise ContractionError(local.problem)
