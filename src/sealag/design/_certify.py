@@ -88,20 +88,11 @@ class _Case:
 
     @property
     def worst_motion(self) -> Array:
-        """Motor velocities y in the motion that first turns the delayed loop active, (n,) complex.
-
-        y = D^-½ x with the eigenvector x of λ_max(cos φ S + i sin φ T), S + T = D^-½ F D^-½ its
-        symmetric and skew parts, at the φ where the numerical radius is reached.
+        """Motor velocities y in the motion that first turns the delayed loop active, (n,) complex;
+        y* D_θ y = 1.
         """
-        root = 1.0 / np.sqrt(self.system.actuators.motor_damping)
-        A, phi = root[:, None] * self.F[self.worst] * root, float(self.bound.angle[self.worst])
-        for _ in range(100):
-            H = np.cos(phi) * (A + A.T) / 2.0 + 0.5j * np.sin(phi) * (A - A.T)
-            x = np.linalg.eigh(H)[1][:, -1]
-            before, phi = phi, -float(np.angle(x.conj() @ A @ x))
-            if abs(phi - before) <= 1e-14:
-                break
-        return root * x
+        x = self.bound.worst_motion(self.worst)
+        return x / np.sqrt(self.system.actuators.motor_damping)
 
     @property
     def max_delay_upper(self) -> float:

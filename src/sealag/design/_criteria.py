@@ -21,7 +21,7 @@ designs; ten times more is refused by `verify`."""
 
 PROOF_SHARE = 1.0 - 1e-7
 """Delays are certified this far below their supremum, where a multiplier has room for rounding. Ten
-times closer, `verify` without --exact is in doubt; ten times further gives up delay for nothing."""
+times closer, `verify` without --exact is in doubt; ten times further costs a millionth of the delay."""
 
 POLYTOPE_WIDTH = 20
 """Intervals between instants in one window of the time-varying bound."""
@@ -37,9 +37,9 @@ def certified_bounds(
     """Bound every instant by the criterion of THEORY section 6 for the law that is run.
 
     Sufficient for a passive controller side along the frozen motion: the signal is one that a
-    potential can belong to, the drives are ideal, the motors carry the static load, no direction is
-    lost that comes back beside the instant, the whole delayed stiffness F_θ is symmetric, the task
-    stiffness positive semidefinite, and d_1 ≤ 1 / w(D^-½ F_θ D^-½).
+    potential can belong to, the drives are ideal, the motors carry the static load, no contact or
+    task is singular, the whole delayed stiffness F_θ is symmetric, the task stiffness positive
+    semidefinite, and d_1 ≤ 1 / w(D^-½ F_θ D^-½).
 
     Args:
         spaces: the law's matrices.
@@ -62,7 +62,7 @@ def certified_bounds(
 def _refusals(
     spaces: Spaces, system: System, rest: Rest | None, motion: Motion | None
 ) -> Iterator[tuple[BoolArray, str]]:
-    """Instants (N,) at which the criterion does not hold, and why, in words."""
+    """Instants (N,) at which a condition of the criterion fails, and which, in words."""
     count, everywhere = len(spaces), np.ones(len(spaces), dtype=bool)
     signal = system.law.signal.refusal(spaces.contraction)
     if signal is not None:
@@ -76,7 +76,7 @@ def _refusals(
         yield (
             load > limit,
             (
-                f"the motor of {joint} gives at most {limit:g} Nm, and gravity asks for "
+                f"the motor of {joint} gives at most {limit:g} Nm, and gravity needs "
                 f"{load.max():.3g} Nm at {(load > limit).sum()} of {count} instants"
             ),
         )
@@ -86,16 +86,16 @@ def _refusals(
         yield (
             speed > limit,
             (
-                f"the motor of {joint} reaches at most {limit:g} rad/s or m/s, and the motion asks "
-                f"for {speed.max():.3g} at {(speed > limit).sum()} of {count} instants"
+                f"the motor of {joint} reaches at most {limit:g} rad/s or m/s, and the motion "
+                f"needs {speed.max():.3g} at {(speed > limit).sum()} of {count} instants"
             ),
         )
     yield (
         spaces.singular,
         (
-            f"contacts or tasks lose a direction at {spaces.singular.sum()} of {count} instants "
-            "that they have beside it, where the stiffness jumps; certify postures away from the "
-            "singularity"
+            f"contacts or tasks lose a direction at {spaces.singular.sum()} of {count} instants, "
+            "where the Jacobian is singular and the stiffness jumps; certify postures away from "
+            "the singularity"
         ),
     )
     bent = ~(spaces.asymmetry <= ASYMMETRY_TOLERANCE)
@@ -105,7 +105,7 @@ def _refusals(
             (
                 f"the fed-back stiffness is not symmetric at {bent.sum()} of {count} instants "
                 f"(asymmetry up to {spaces.asymmetry[bent].max():.2e}, from "
-                f"{_asymmetry_source(system)}), so that no potential belongs to it"
+                f"{_asymmetry_source(system)}), so that it has no potential"
             ),
         )
     negative = ~_semidefinite(spaces.F_task)

@@ -14,6 +14,10 @@ from sealag.passivity._solvers import ClarabelDirect, Solver
 from sealag.typing import Array, BoolArray
 
 
+_TURNS = 100
+"""Steps in which the angle of the worst motion settles; it takes 2 to 5."""
+
+
 class Residual(NamedTuple):
     """How far an inequality holds: it does where the lowest eigenvalue exceeds its rounding."""
 
@@ -77,17 +81,30 @@ class Bound:
 
     @property
     def direction(self) -> Array:
-        """Share of each joint in the motion that first turns the delayed loop active, (…, n).
+        """Share of each joint in the motion that first turns the delayed loop active, (…, n): its
+        part of the damping power θ̇ᵀ D_θ θ̇."""
+        motion = _extremal(self.problem.scaled_stiffness(), self._angle)
+        return np.square(np.abs(motion), dtype=np.float64)
 
-        The motion is the eigenvector of λ_max(cos φ S + i sin φ T) at the maximising φ, with S and
-        T the symmetric and skew parts of D^-½ F D^-½; a joint's share is its part of the damping
-        power θ̇ᵀ D_θ θ̇.
-        """
+    @property
+    def _angle(self) -> Array:
         if self.angle is None:
             raise InputError("A shared multiplier has no single direction; solve with Instant().")
-        A, phi = self.problem.scaled_stiffness(), self.angle[..., None, None]
-        H = np.cos(phi) * symmetric(A) + 0.5j * np.sin(phi) * (A - transposed(A))
-        return np.square(np.abs(np.linalg.eigh(H)[1][..., -1]), dtype=np.float64)
+        return self.angle
+
+    def worst_motion(self, instant: int) -> Array:
+        """Return D_θ^½ θ̇ of the motion that first turns the delayed loop active, (n,) complex.
+
+        Args:
+            instant: which one.
+        """
+        A, phi = self.problem.at(instant).scaled_stiffness(), self._angle[instant]
+        for _ in range(_TURNS):
+            x = _extremal(A, phi)
+            before, phi = phi, -np.angle(x.conj() @ A @ x)
+            if abs(phi - before) <= 1e-14:
+                break
+        return _extremal(A, phi)
 
     @property
     def blocks(self) -> tuple[Array, ...]:
@@ -155,3 +172,10 @@ class Bound:
         delay, upper = np.array(self.delay), np.array(self.upper)
         delay[instants] = upper[instants] = 0.0
         return replace(self, delay=delay, upper=upper, refusals=(*self.refusals, reason))
+
+
+def _extremal(A: Array, angle: Array) -> Array:
+    """Eigenvector of λ_max(cos φ S + i sin φ T), S and T the symmetric and skew parts of A."""
+    phi = np.asarray(angle)[..., None, None]
+    H = np.cos(phi) * symmetric(A) + 0.5j * np.sin(phi) * (A - transposed(A))
+    return np.linalg.eigh(H)[1][..., -1]

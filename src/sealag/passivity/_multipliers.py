@@ -7,7 +7,6 @@ D_θ = Σ D_i, so that (29) holds for level i with D_i; the sum of these is (31)
 """
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from sealag.errors import InputError, SolverError
 from sealag.passivity._measure import factorise, proven_delays
@@ -71,14 +70,14 @@ def _damping_parts(problem: Problem, delay: float) -> list[Array] | None:
 
 def _divided(problem: Problem, parts: list[Array], delay: float) -> Array | None:
     """Each level's closed form with its part of the damping."""
-    blocks = []
+    whole = np.zeros((len(problem.J), len(problem.J)))
     for rows, part in zip(problem.rows, parts, strict=True):
         root = np.linalg.inv(np.linalg.cholesky(part))
         W = _closed_form(problem.J[rows] @ root.T, root @ problem.M[:, rows], delay)
         if W is None:
             return None
-        blocks.append(W)
-    return block_diag(*blocks)
+        whole[rows, rows] = W
+    return whole
 
 
 def _eased(problem: Problem, W: Array | None, delay: float) -> Array | None:

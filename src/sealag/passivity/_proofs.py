@@ -98,11 +98,11 @@ class InstantProof:
             return dissipates(D, d, M=number(self.F), W=W, loss=W[0])
         J, S = number(self.J_star), number(self.stiffness)
         rows = [slice(first, after) for first, after in pairwise(question.levels)]
-        loss = sum(J[at].T @ block @ J[at] for at, block in zip(rows, W, strict=True))
+        loss = np.sum([J[at].T @ block @ J[at] for at, block in zip(rows, W)], axis=0)
         M = np.hstack([J[at].T @ S[at, at] for at in rows])
         sizes = np.abs(self.J_star)
         terms = (
-            sum(sizes[at].T @ np.abs(block) @ sizes[at] for at, block in zip(rows, self.W)),
+            np.sum([sizes[at].T @ np.abs(B) @ sizes[at] for at, B in zip(rows, self.W)], axis=0),
             sizes.T @ np.abs(self.stiffness),
         )
         return dissipates(D, d, M=M, W=W, loss=loss, terms=terms)
