@@ -1,28 +1,50 @@
-"""A control tick beside Pink's on the same robot."""
+"""A control tick beside those of PlaCo, TSID and Pink on the same robot."""
 
 import itertools
-import statistics
-import time
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
+from bench.peers.timing import median_us
 from sealag.design import load
+from sealag.robot import example_robot_path
 from sealag.whole_body import SIGNAL_NAMES, Controller, Measurement, signal_named
 
-BLOCKS, TICKS = 7, 300
+ANYMAL = "anymal_b_simple_description/robots/anymal.urdf"
+PEERS = Path(__file__).with_name("peers")
 
 
-def _median_us(call: Callable[[], object]) -> float:
-    call()
-    times = []
-    for _ in range(BLOCKS):
-        start = time.perf_counter()
-        for _ in range(TICKS):
-            call()
-        times.append((time.perf_counter() - start) / TICKS)
-    return statistics.median(times) * 1e6
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Peer:
+    """A solver that needs another Pinocchio than sealag.
+
+    Attributes:
+        name: what it is called.
+        script: the file of `bench/peers` that times it.
+        requirements: what its environment holds.
+    """
+
+    name: str
+    script: str
+    requirements: tuple[str, ...]
+
+
+OTHERS = (
+    Peer(name="PlaCo", script="placo_tick.py", requirements=("placo==0.10.2",)),
+    Peer(
+        name="TSID",
+        script="tsid_tick.py",
+        requirements=(
+            "tsid==1.7.1", "pin==3.4.0", "cmeel-urdfdom<5", "cmeel-tinyxml2==10.0.0", "numpy<2.3",
+        ),
+    ),
+)  # fmt: skip
 
 
 def _ours(signal: str) -> Callable[[], object]:
@@ -53,10 +75,7 @@ def _pink() -> Callable[[], object]:
     import pinocchio as pin
     from pink.tasks import ComTask, FrameTask, PostureTask
 
-    from sealag.robot import example_robot_path
-
-    path = example_robot_path("anymal_b_simple_description/robots/anymal.urdf")
-    model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
+    model = pin.buildModelFromUrdf(str(example_robot_path(ANYMAL)), pin.JointModelFreeFlyer())
     q = load("examples/anymal.toml").posture
     configuration = pink.Configuration(model, model.createData(), q)
     tasks = [FrameTask(f"{leg}_FOOT", 1.0, 0.0) for leg in ("LF", "RF", "LH", "RH")]
@@ -71,13 +90,50 @@ def _pink() -> Callable[[], object]:
     return tick
 
 
+def _environment(peer: Peer) -> Path:
+    """Return the interpreter of a peer's environment, built at its first use."""
+    folder = PEERS / ".environments" / peer.name.lower()
+    python = folder / "bin" / "python"
+    if not (folder / "ready").exists():
+        print(f"  (building an environment for {peer.name})", flush=True)
+        subprocess.run([sys.executable, "-m", "venv", "--clear", folder], check=True)
+        subprocess.run([python, "-m", "pip", "install", "-qqq", *peer.requirements], check=True)
+        (folder / "ready").touch()
+    return python
+
+
+def _without_meshes(folder: Path) -> Path:
+    """Write the robot without visuals and collision shapes, which PlaCo would look for."""
+    tree = ElementTree.parse(example_robot_path(ANYMAL))
+    for link in tree.getroot().iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(shape)
+    path = folder / "anymal.urdf"
+    tree.write(path)
+    return path
+
+
+def _other_us(peer: Peer, urdf: Path) -> float:
+    """Return the microseconds of a peer's tick, timed in its own process."""
+    q = " ".join(repr(float(value)) for value in load("examples/anymal.toml").posture)
+    call = [_environment(peer), PEERS / peer.script, urdf, q]
+    done = subprocess.run(call, check=True, capture_output=True, text=True)
+    return float(done.stdout)
+
+
 def run() -> None:
     """Print microseconds a tick on ANYmal with four feet, and the ratios."""
     print("\nOne control tick, ANYmal, four point feet, CoM and base orientation")
-    own = {name: _median_us(_ours(name)) for name in SIGNAL_NAMES}
+    own = {name: median_us(_ours(name)) for name in SIGNAL_NAMES}
     for name, value in own.items():
-        print(f"  sealag, {name:18} {value:7.1f} µs (torques from dynamics)")
-    peer = _median_us(_pink())
-    print(f"  Pink                       {peer:7.1f} µs (velocities, a smaller problem)")
-    for name in ("motor", "static_joint_tank"):
-        print(f"  ratio Pink / {name:18} {peer / own[name]:5.1f}")
+        print(f"  sealag, {name:18} {value:7.1f} µs (torques)")
+    with tempfile.TemporaryDirectory() as folder:
+        urdf = _without_meshes(Path(folder))
+        peers = {peer.name: _other_us(peer, urdf) for peer in OTHERS}
+    for name, value in peers.items():
+        print(f"  {name:26} {value:7.1f} µs (torques, by a QP)")
+    peers["Pink"] = median_us(_pink())
+    print(f"  Pink                       {peers['Pink']:7.1f} µs (velocities, a smaller problem)")
+    slowest = max(own.values())
+    for name, value in peers.items():
+        print(f"  {name} / slowest signal of sealag {value / slowest:5.2f}")

@@ -96,3 +96,20 @@ def either(names: Sequence[str]) -> str:
     if not names:
         return "none"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+__all__ = [
+    "CertificateError",
+    "ContractionError",
+    "FileError",
+    "InputError",
+    "MotionError",
+    "ProjectError",
+    "RobotError",
+    "SealagError",
+    "SolverError",
+    "UnknownNameError",
+    "either",
+    "near",
+    "word",
+]

@@ -115,3 +115,12 @@ def write_text(path: Path, text: str) -> None:
     """
     with written_whole(path) as file:
         file.write(text.encode("utf-8"))
+
+
+__all__ = [
+    "check_output",
+    "make_folder",
+    "read_whole",
+    "write_text",
+    "written_whole",
+]

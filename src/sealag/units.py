@@ -86,3 +86,12 @@ def check_delay_s(value_s: float, name: str) -> float:
             f"was {value_s:g} ms meant? Then write {value_s * 1e-3:g} s."
         )
     return value_s
+
+
+__all__ = [
+    "LONGEST_DELAY_S",
+    "check_delay_s",
+    "number_of",
+    "seconds_from_ms",
+    "time_text",
+]

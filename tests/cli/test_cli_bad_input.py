@@ -216,10 +216,10 @@ def test_good_arm_is_not_refused_and_mimics_have_no_actuator(tmp_path):
 
 @pytest.fixture(scope="module")
 def walk():
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import GroundProfile, plan_walk, walk_motion
 
     system = load("bundled:hume")
-    return system, walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=50.0)
+    return system, walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=1), rate=50.0)
 
 
 def spoil_nan(table):

@@ -52,10 +52,10 @@ def test_answers_with_the_contract(design, criterion, tmp_path, capsys):
 
 def test_motion_of_many_instants(tmp_path, capsys):
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import GroundProfile, plan_walk, walk_motion
 
     system = load("bundled:hume")
-    motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=200.0)
+    motion = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=1), rate=200.0)
     answers = []
     for ending in (".csv", ".npz", ".parquet"):
         path = tmp_path / f"walk{ending}"
@@ -80,10 +80,10 @@ def test_motion_of_many_instants(tmp_path, capsys):
 def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
     """Seven steps at 1 kHz, default proofs, common and time-varying multipliers."""
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import GroundProfile, plan_walk, walk_motion
 
     system = load("bundled:hume")
-    motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=7), rate=1000.0)
+    motion = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=7), rate=1000.0)
     walk, out = tmp_path / "walk.npz", tmp_path / "c.json"
     save_motion(motion, system.robot, walk)
     code, text, _ = run(
@@ -114,11 +114,11 @@ def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
 
 def test_proofs_are_as_many_as_asked_for(tmp_path, capsys):
     from sealag.design import load, save_motion
-    from sealag.locomotion import paper_terrain, plan_walk, walk_motion
+    from sealag.walking import GroundProfile, plan_walk, walk_motion
 
     system = load("bundled:hume")
     walk, out = tmp_path / "walk.npz", tmp_path / "c.json"
-    motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=50.0)
+    motion = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=1), rate=50.0)
     save_motion(motion, system.robot, walk)
     counts = {}
     for proofs in ("3", "all"):

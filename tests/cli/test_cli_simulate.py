@@ -12,8 +12,8 @@ from sealag.cli import main
 from sealag.cli._simulate import summary
 from sealag.delay import RoundTrip, Sinusoid
 from sealag.design import load, resolve_project, simulate
-from sealag.locomotion import WalkingGait, WalkingOptions
 from sealag.report import read_recording
+from sealag.walking import WalkingGait, WalkingOptions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

@@ -12,9 +12,9 @@ from typing import Any
 import sealag
 from sealag.design import System
 from sealag.errors import CertificateError
-from sealag.locomotion import paper_terrain, plan_walk, walk_motion
 from sealag.passivity import verify, write_certificate
 from sealag.robot import Motion
+from sealag.walking import GroundProfile, plan_walk, walk_motion
 from sealag.whole_body import MotorAngles, Tank
 
 
@@ -64,7 +64,7 @@ def made(name: str) -> dict[str, Any]:
 
 def half_a_step(system: System) -> Motion:
     """Forty instants of Hume's walk."""
-    whole = walk_motion(system.robot, plan_walk(paper_terrain(), steps=2), rate=100.0)
+    whole = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=2), rate=100.0)
     part = slice(0, 40)
     return Motion(
         time=whole.time[part],

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from sealag.design import load
-from sealag.locomotion import FlatTerrain, begin_walk
+from sealag.walking import GroundProfile, begin_walk
 from sealag.whole_body import Controller, Measurement, Tank
 
 WARM, TICKS = 1_000, 10_000
@@ -34,10 +34,11 @@ def standing():
 def walking():
     """Return Hume's walking controller and the state at the apex, which it sees for ever."""
     system = load("bundled:hume")
-    controller, q, v, _ = begin_walk(system.robot, system.actuators, FlatTerrain())
-    measured = _measured(system.robot, q, v, 2)
+    walk = replace(system.walking, ground=GroundProfile.flat())
+    start = begin_walk(system.robot, system.actuators, walk)
+    measured = _measured(system.robot, start.q, start.v, 2)
     measured.contact[1] = 1.0
-    return controller, measured
+    return start.controller, measured
 
 
 def _measured(robot, q, v, contacts):

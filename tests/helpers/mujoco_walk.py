@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 
 from helpers.mujoco_sea import MujocoRobot
+from humanoids2016 import WalkCase
 from sealag.design import System
-from sealag.locomotion import begin_walk
-from sealag.paper import WalkCase
+from sealag.walking import begin_walk
 from sealag.whole_body import Measurement
 
 TICK = 1e-3
@@ -77,8 +77,9 @@ class _Feet:
     """
 
     def __init__(self, twin: MujocoRobot, case: WalkCase):
-        self.twin, self.terrain, self.friction = twin, case.terrain, case.friction
-        self.radius = case.gait.foot_radius
+        walking = case.walking
+        self.twin, self.ground, self.friction = twin, walking.ground, walking.friction
+        self.radius = walking.gait.foot_radius
         m = twin.model
         self.site = [m.site(f).id for f in FEET]
         self.plane = [m.geom("ground_" + f).id for f in FEET]
@@ -105,7 +106,7 @@ class _Feet:
                 continue
             if self.mode[f] is Mode.OPEN:
                 x, y, z = d.site_xpos[self.site[f]].tolist()
-                if z - self.radius <= self.terrain.height(x, y):
+                if z - self.radius <= self.ground.height(x, y):
                     self._touch(f, x, y)
             elif self.mode[f] is Mode.STICK:
                 self._check_stick(f)
@@ -175,7 +176,7 @@ class _Feet:
         )
 
     def _touch(self, f, x, y):
-        slope = (self.terrain.height(x + 1e-3, y) - self.terrain.height(x - 1e-3, y)) / 2e-3
+        slope = (self.ground.height(x + 1e-3, y) - self.ground.height(x - 1e-3, y)) / 2e-3
         c, s = 1.0 / np.hypot(1.0, slope), slope / np.hypot(1.0, slope)
         self.axes[f] = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
         d = self.twin.data
@@ -222,15 +223,14 @@ class _Feet:
 def mujoco_walk(system: System, case: WalkCase, *, step: float) -> MujocoWalk:
     """Walk a case with MuJoCo as plant, at one of its steps (s)."""
     robot, springs = system.robot, system.actuators
-    controller, q, v, theta = begin_walk(
-        robot, springs, case.terrain, feet=FEET, gait=case.gait, options=case.options
-    )
+    start = begin_walk(robot, springs, case.walking)
+    controller = start.controller
     twin = MujocoRobot.build(
         robot, springs, step=step, feet=FEET, delay=LONGEST, friction=0.0,
         radius=RADIUS, soft=4.0 * step,
     )  # fmt: skip
     m, d = twin.model, twin.data
-    twin.write(q, v, theta, v[-6:])
+    twin.write(start.q, start.v, start.theta, start.theta_dot)
     mujoco.mj_forward(m, d)
     feet = _Feet(twin, case)
     feet.hold(1)
@@ -252,7 +252,7 @@ def mujoco_walk(system: System, case: WalkCase, *, step: float) -> MujocoWalk:
     up = Queue(central.up.delay.at, first)
     down = Queue(central.down.delay.at, 0.0)
     drive = Queue(embedded.down.delay.at, 0.0)
-    ticks = round((case.steps + 0.5) * case.gait.step_time / TICK)
+    ticks = round(case.walking.duration / TICK)
     rows = []
     for k in range(ticks):
         t = k * TICK

@@ -3,7 +3,8 @@
 import jitcdde
 import numpy as np
 
-from sealag.margin import delay_margin, random_sea_plant
+from humanoids2016 import random_sea_plant
+from sealag.margin import delay_margin
 
 
 def growth(A_0: np.ndarray, A_1: np.ndarray, *, delay: float, omega: float, mode) -> float:

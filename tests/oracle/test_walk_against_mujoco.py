@@ -6,25 +6,25 @@ import numpy as np
 import pytest
 
 from helpers.mujoco_walk import mujoco_walk
+from humanoids2016 import WalkCase, simulate_walk
 from sealag.design import load
-from sealag.paper import WalkCase, simulate_walk
 
-CASE = WalkCase(steps=7, physics=1.25e-4, embedded=1e-3)
+HUME = load("bundled:hume")
+CASE = WalkCase(walking=HUME.walking, physics=1.25e-4, embedded=1e-3)
 
 
 @pytest.fixture(scope="module")
 def hume():
     """Hume without the limits of its motors, which the MuJoCo model has not."""
-    system = load("bundled:hume")
-    none = np.full(system.robot.n, np.inf)
-    free = replace(system.actuators, torque_limit=none, velocity_limit=none)
-    return replace(system, actuators=free)
+    none = np.full(HUME.robot.n, np.inf)
+    free = replace(HUME.actuators, torque_limit=none, velocity_limit=none)
+    return replace(HUME, actuators=free)
 
 
 @pytest.fixture(scope="module")
 def ours(hume):
     walk = simulate_walk(hume, CASE)
-    assert walk.is_gait
+    assert walk.gait.is_gait
     return walk
 
 
@@ -32,9 +32,9 @@ def _apart(walk, twin):
     """Largest difference of joint angles (rad), motor angles (rad), and of touchdowns (s)."""
     joints = np.abs(twin.q - walk.run.q)[:, -6:].max()
     motors = np.abs(twin.theta - walk.run.theta).max()
-    times = twin.touchdowns(CASE.gait.step_time)
-    assert len(times) == len(walk.touchdown)
-    return joints, motors, np.abs(times - walk.touchdown).max()
+    times = twin.touchdowns(CASE.walking.gait.step_time)
+    assert len(times) == len(walk.gait.touchdown)
+    return joints, motors, np.abs(times - walk.gait.touchdown).max()
 
 
 def test_the_same_walk_at_the_finest_step(hume, ours):

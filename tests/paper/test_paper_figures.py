@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sealag.design import load
-from sealag.locomotion import FlatTerrain, paper_terrain, plan_walk, walk_motion
-from sealag.paper import (
+from humanoids2016 import (
     PUBLISHED_LAW,
     TorqueTrace,
     Verdict,
@@ -17,15 +15,18 @@ from sealag.paper import (
     figure_4_claims,
     figure_5_claims,
     measured_lag,
+    planned_walk,
     random_plant_table,
     robustness_cases,
-    rough_terrains,
+    rough_grounds,
     simulate_walk,
     simulated_motion,
     unsafe_examples,
     walk_claim,
     walk_success,
 )
+from sealag.design import load
+from sealag.walking import GroundProfile
 from sealag.whole_body import StiffnessForm
 
 HUME = load("bundled:hume")
@@ -38,8 +39,7 @@ def table():
 
 @pytest.fixture(scope="module")
 def figure():
-    motion = walk_motion(HUME.robot, plan_walk(paper_terrain(), steps=7), rate=50.0)
-    return figure_4(HUME.robot, motion, system=HUME)
+    return figure_4(HUME, planned_walk(HUME, rate=50.0))
 
 
 def test_claims_of_figure_4(figure, table):
@@ -84,7 +84,7 @@ def _trace(*, beta, alpha, deviation, raw, lag, walk):
     [(1.0, 0.017, Verdict.CONFIRMED), (-1.0, 0.030, Verdict.CONTRADICTED)],
 )
 def test_claims_of_figure_5_follow_the_torques(sign, lag, verdict):
-    walk = simulate_walk(HUME, WalkCase(steps=1))
+    walk = simulate_walk(HUME, WalkCase(walking=replace(HUME.walking, steps=1)))
     traces = [
         _trace(beta=beta, alpha=alpha, deviation=5 + sign * (beta + alpha), lag=lag,
                raw=50 + sign * 30 * alpha, walk=walk)
@@ -100,9 +100,9 @@ def test_claims_of_figure_5_follow_the_torques(sign, lag, verdict):
 
 
 def test_the_default_project_walks_twenty_rough_grounds_with_noise_and_wrong_models():
-    cases = {k: v for k, v in robustness_cases(steps=7).items() if k.startswith("noise and")}
-    cases[PUBLISHED_LAW] = ablation_cases()[PUBLISHED_LAW]
-    robust, published = walk_success(cases, rough_terrains(20))
+    cases = {k: v for k, v in robustness_cases(HUME.walking).items() if k.startswith("noise and")}
+    cases[PUBLISHED_LAW] = ablation_cases(HUME.walking)[PUBLISHED_LAW]
+    robust, published = walk_success(cases, rough_grounds(20))
     assert robust.gaits >= 19, robust.causes
     claim = walk_claim([robust], published)
     assert claim.verdict is Verdict.QUALIFIED  # it walks, but not with the law as printed
@@ -161,19 +161,20 @@ def test_lag_estimate_finds_a_known_shift():
 
 
 def test_hume_walks_and_the_energy_closes():
-    walk = simulate_walk(HUME, WalkCase(steps=7))
-    assert walk.walked, walk.cause
-    assert walk.is_gait
+    walk = simulate_walk(HUME)
+    assert walk.gait.walked, walk.gait.cause
+    assert walk.gait.is_gait
     assert walk.run.audit.closure < 1e-4
     assert walk.run.measurement_age.max() > 0.01
     motion = simulated_motion(walk.run)
     assert {c[0].frame for c in motion.contact_sets} == {"left_foot", "right_foot"}
     switches = np.count_nonzero(np.diff(motion.contact_index))
-    assert walk.steps - 1 <= switches <= walk.steps + 3
+    assert walk.gait.steps - 1 <= switches <= walk.gait.steps + 3
 
 
 def test_a_walk_beyond_its_delay_ends_as_a_named_fall():
-    walk = simulate_walk(HUME, WalkCase(terrain=FlatTerrain(), steps=7, delay_scale=8.0))
-    assert not walk.walked
+    flat = replace(HUME.walking, ground=GroundProfile.flat())
+    walk = simulate_walk(HUME, WalkCase(walking=flat, delay_scale=8.0))
+    assert not walk.gait.walked
     assert walk.run.outcome.value in {"fell", "diverged", "contact_unsolvable", "chattered"}
-    assert str(walk.steps) in walk.cause
+    assert str(walk.gait.steps) in walk.gait.cause

@@ -9,30 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sealag.design import certify, load
-from sealag.locomotion import paper_terrain, plan_walk, walk_motion
-from sealag.paper import (
-    AblationTable,
-    DelayMap,
-    WalkCase,
-    delay_map,
-    figure_4,
-    figure_4_claims,
-    figure_5,
-    random_plant_table,
-    simulate_walk,
-    unsafe_examples,
-    walk_success,
-)
-from sealag.report import (
-    beyond_section,
-    energy_section,
-    figure_5_section,
-    limits_section,
-    means_section,
-    walk_section,
-    write_paper_page,
-)
+from humanoids2016 import QUICK, AblationTable, DelayMap, study, write_paper_page
 
 
 class Links(HTMLParser):
@@ -53,43 +30,22 @@ class Links(HTMLParser):
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """A page from small computations, and what went into it."""
+    """A page from few cases, and what went into it."""
     out = tmp_path_factory.mktemp("page")
-    system = load("bundled:hume")
-    motion = walk_motion(system.robot, plan_walk(paper_terrain(), steps=1), rate=20.0)
-    figure = figure_4(system.robot, motion, system=system)
-    walk = simulate_walk(system, WalkCase(steps=2))
-    rows = walk_success({"default": WalkCase(steps=1)}, [paper_terrain()])
-    printed = replace(rows[0], name="published law", walked=0, mean_steps=1.25)
-    table = random_plant_table(30)
-    delays = delay_map(motion, stiffnesses=[350.0], scales=[1.0, 6.0], terrains=1)
+    found = study("bundled:hume", QUICK, progress=lambda _: None)
     everywhere = AblationTable(
         means=("everything", "no lead"), conditions=("K = 200", "α = 2", "no delay"), terrains=7,
         walked=np.array([[7, 6, 5], [4, 3, 2]]), gaits=np.array([[6, 5, 4], [1, 1, 0]]),
     )  # fmt: skip
-    certificate = certify(system, motion, time_varying=True)
-    traces = figure_5(betas=[0.5], jobs=2)
-    extra = [
-        walk_section(system, walk, rows, rows),
-        means_section(system, walk, [*rows, printed], everywhere, rows),
-        energy_section(walk, certificate),
-        limits_section(figure, figure, rows, delays),
-        figure_5_section(traces, system.robot.joints),
-        beyond_section(rows, certificate),
-    ]
-    page = write_paper_page(
-        out, figure, figure_4_claims(figure, table), unsafe=unsafe_examples(draws=10),
-        table=table, simulated=figure, traces=traces, extra=extra, version="test",
-    )  # fmt: skip
-    return SimpleNamespace(
-        page=page, figure=figure, delays=delays, certificate=certificate, walk=walk, traces=traces,
-        instants=len(motion),
-    )  # fmt: skip
+    printed = replace(found.ablations[0], name="published law", walked=0, mean_steps=1.25)
+    found = replace(found, everywhere=everywhere, ablations=(found.ablations[0], printed))
+    return SimpleNamespace(found=found, page=write_paper_page(out, found, version="test"))
 
 
 def test_page_needs_no_network_and_holds_the_numbers(written):
-    figure, delays, certificate = written.figure, written.delays, written.certificate
-    walk, traces, out = written.walk, written.traces, written.page.parent
+    found, out = written.found, written.page.parent
+    figure, delays, certificate = found.figure, found.delays, found.certificate
+    walk, traces = found.walk, found.traces
     text = written.page.read_text()
     links = Links()
     links.feed(text)
@@ -119,7 +75,7 @@ def test_page_needs_no_network_and_holds_the_numbers(written):
     assert torques[f"spring_{walk.run.joints[0]}_nm"][-1] == pytest.approx(expected, rel=1e-8)
     csv = np.genfromtxt(out / "figure4.csv", delimiter=",", names=True)
     np.testing.assert_allclose(csv["one_leg_delay_s_D10"], figure.delay_s[1], rtol=1e-8)
-    assert len((out / "figure4_instants.csv").read_text().splitlines()) == written.instants + 1
+    assert len((out / "figure4_instants.csv").read_text().splitlines()) == len(found.motion) + 1
 
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sealag.margin import delay_margin, random_sea_plant
-from sealag.paper import PlantComparison, compare_plant
+from humanoids2016 import PlantComparison, compare_plant, random_sea_plant
+from sealag.margin import delay_margin
 from sealag.whole_body import SIGNAL_NAMES
 
 PLANTS = 1000

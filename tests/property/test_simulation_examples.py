@@ -35,45 +35,65 @@ def test_first_law(name, scenario):
         assert moved > 10.0
 
 
+def _design(system, *, stiffness, signal, gravity, springs=1.0, damping=1.0):
+    """The design with its gains, springs and dampers scaled, and another signal."""
+    motors = system.actuators
+    tasks = tuple(
+        replace(task, stiffness=scale * np.asarray(task.stiffness))
+        for task, scale in zip(system.law.tasks, stiffness, strict=True)
+    )
+    return replace(
+        system,
+        law=replace(system.law, tasks=tasks, signal=signal_named(signal), gravity=gravity),
+        actuators=replace(
+            motors,
+            spring_stiffness=springs * motors.spring_stiffness,
+            motor_damping=damping * motors.motor_damping,
+        ),
+    )
+
+
 def _drawn(system, rng):
     """The design with other gains, springs, dampers and signals, good or bad."""
 
     def factor(low, high):
         return 10.0 ** rng.uniform(low, high)
 
-    tasks = tuple(
-        replace(task, stiffness=factor(-2, 3) * np.asarray(task.stiffness))
-        for task in system.law.tasks
-    )
-    motors = system.actuators
-    return replace(
+    return _design(
         system,
-        law=replace(
-            system.law,
-            tasks=tasks,
-            signal=signal_named(str(rng.choice(SIGNAL_NAMES))),
-            gravity=rng.choice(list(GravityCompensation)),
-        ),
-        actuators=replace(
-            motors,
-            spring_stiffness=factor(-2, 1) * motors.spring_stiffness,
-            motor_damping=factor(-3, 2) * motors.motor_damping,
-        ),
+        stiffness=[factor(-2, 3) for _ in system.law.tasks],
+        signal=str(rng.choice(SIGNAL_NAMES)),
+        gravity=rng.choice(list(GravityCompensation)),
+        springs=factor(-2, 1),
+        damping=factor(-3, 2),
+    )
+
+
+def _wild(system):
+    """Stiff tasks, hardly damped motors without limits, motor angles: what throws itself over."""
+    strong = replace(system.actuators, torque_limit=np.full(system.robot.n, np.inf))
+    return _design(
+        replace(system, actuators=strong),
+        stiffness=[1e3] * len(system.law.tasks),
+        signal="motor",
+        gravity=system.law.gravity,
+        damping=1e-3,
     )
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_design_ends_in_a_traceback(name):
     """Whatever the gains: a refusal in sealag's words, or a run with a named outcome and finite
-    numbers. The draws must reach both, and runs that go wrong."""
+    numbers. Drawn designs must reach refusals and completed runs; a wild one goes wrong, unless its
+    base is fixed: nothing falls there."""
     rng, system, ends = np.random.default_rng(7), load(EXAMPLES / f"{name}.toml"), Counter()
-    for _ in range(12):
+    for draw in range(10):
         try:
             run = simulate(
-                _drawn(system, rng),
-                scenario=str(rng.choice(SCENARIOS)),
+                _drawn(system, rng) if draw else _wild(system),
+                scenario=str(rng.choice(SCENARIOS)) if draw else "track",
                 duration=0.25,
-                delay_scale=10.0 ** rng.uniform(-1, 2),
+                delay_scale=10.0 ** rng.uniform(-1, 2) if draw else 1.0,
             )
         except SealagError:
             ends["refused"] += 1
@@ -81,4 +101,5 @@ def test_no_design_ends_in_a_traceback(name):
         assert bool(run.message) == (run.outcome is not Outcome.COMPLETED)
         json.dumps(summary(run, Path("run.mcap")), allow_nan=False)
         ends["completed" if run.outcome is Outcome.COMPLETED else "ended"] += 1
-    assert min(ends[end] for end in ("refused", "completed", "ended")) > 0
+    assert min(ends[end] for end in ("refused", "completed")) > 0
+    assert (ends["ended"] > 0) == system.robot.floating_base

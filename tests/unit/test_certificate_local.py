@@ -9,7 +9,8 @@ import pytest
 
 import sealag
 from helpers.certificates import failures, made, plain, resealed
-from sealag.margin import delay_margin, random_sea_plant, rightmost_roots
+from humanoids2016 import random_sea_plant
+from sealag.margin import delay_margin, rightmost_roots
 from sealag.passivity import verify
 
 NO_EARLIER = "no root crosses before"

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from humanoids2016 import random_sea_plant
 from sealag.errors import InputError
-from sealag.margin import _pictures, delay_margin, delay_margins, random_sea_plant
+from sealag.margin import _pictures, delay_margin, delay_margins
 
 PLANTS = [random_sea_plant(seed, joints=2) for seed in range(12)]
 

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from humanoids2016 import random_sea_plant
 from sealag.errors import InputError, SolverError
-from sealag.margin import delay_margin, delay_margins, random_sea_plant, rightmost_roots
+from sealag.margin import delay_margin, delay_margins, rightmost_roots
 
 KNOWN = [
     ([[-2, 0], [0, -0.9]], [[-1, 0], [-1, -1]], math.acos(-0.9) / math.sqrt(0.19)),

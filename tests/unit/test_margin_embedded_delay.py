@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from humanoids2016 import random_sea_plant
 from sealag.errors import InputError, SolverError
-from sealag.margin import delay_margin, delay_margins, random_sea_plant, rightmost_roots
+from sealag.margin import delay_margin, delay_margins, rightmost_roots
 
 
 def collocated(A_0, A_1, A_e, d: float, e: float, *, nodes: int = 44) -> np.ndarray:

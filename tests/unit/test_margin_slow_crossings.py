@@ -6,7 +6,8 @@ import flint
 import numpy as np
 import pytest
 
-from sealag.margin import delay_margin, random_sea_plant, rightmost_roots
+from humanoids2016 import random_sea_plant
+from sealag.margin import delay_margin, rightmost_roots
 
 
 @pytest.mark.parametrize("excess", [1e-3, 1e-8, 1e-12, 2.0**-52])

@@ -14,7 +14,6 @@ from sealag.delay import Constant, Link, PacketOrder, Sinusoid
 from sealag.robot import Contact, load_robot
 from sealag.simulation import (
     Clock,
-    FlatGround,
     Foot,
     Network,
     Outcome,
@@ -22,6 +21,7 @@ from sealag.simulation import (
     Scene,
     closed_loop,
 )
+from sealag.walking import GroundProfile
 
 FEET = ("left_foot", "right_foot")
 ROTOR = np.array([0.1357, 0.093, 0.093] * 2)
@@ -67,7 +67,7 @@ def _everything(robot):
         for foot in FEET
     ]
     pushes = [Push(frame="torso", force=(60.0, 20.0, 0.0), start=0.15, duration=0.1)]
-    return springs, network, Scene(feet=feet, ground=FlatGround(level=0.1), pushes=pushes)
+    return springs, network, Scene(feet=feet, ground=GroundProfile.flat(0.1), pushes=pushes)
 
 
 def test_nothing_lost_on_a_held_foot(hume):

@@ -7,8 +7,9 @@ from helpers.controllers import JointPD
 from sealag.actuation import actuators
 from sealag.errors import InputError
 from sealag.robot import Contact, ContactKind, load_robot
-from sealag.simulation import Clock, FlatGround, Foot, Outcome, Push, Scene, closed_loop
+from sealag.simulation import Clock, Foot, Outcome, Push, Scene, closed_loop
 from sealag.simulation._ground import contact_frame
+from sealag.walking import GroundProfile
 
 
 class Slope:
@@ -35,7 +36,7 @@ def test_contact_frame_of_a_slope(kind):
     C = contact_frame(kind(0.3), 0.2, -0.1)
     np.testing.assert_allclose(C @ C.T, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(C[2], np.array([-0.3, 0, 1]) / np.hypot(0.3, 1), atol=1e-9)
-    np.testing.assert_allclose(contact_frame(FlatGround(level=2.0), 0, 0), np.eye(3))
+    np.testing.assert_allclose(contact_frame(GroundProfile.flat(2.0), 0, 0), np.eye(3))
 
 
 @pytest.fixture(scope="module")

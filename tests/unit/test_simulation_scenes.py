@@ -13,7 +13,6 @@ from sealag.robot import Contact, ContactKind, load_robot
 from sealag.simulation import (
     Clock,
     EventKind,
-    FlatGround,
     Foot,
     Network,
     Outcome,
@@ -24,6 +23,7 @@ from sealag.simulation import (
     touching_posture,
 )
 from sealag.simulation._plant import Plant
+from sealag.walking import GroundProfile
 
 FEET = ("left_foot", "right_foot")
 
@@ -80,21 +80,21 @@ class TestStart:
         q[-3:] += [2e-3, -1e-3, 3e-3]
         gaps = [hume.frame_placement(foot, q)[1][2] for foot in FEET]
         assert abs(gaps[0] - gaps[1]) > 1e-4  # without help one foot is in the air
-        stands = touching_posture(hume, q, _feet(), ground=FlatGround())
+        stands = touching_posture(hume, q, _feet(), ground=GroundProfile.flat())
         heights = [hume.frame_placement(foot, stands)[1][2] for foot in FEET]
         assert np.abs(heights).max() < 1e-9
         assert np.abs(hume.difference(q, stands)).max() < 2 * abs(gaps[0] - gaps[1])
 
     def test_a_touching_posture_stays(self, hume):
-        stands = touching_posture(hume, _posture(hume), _feet(), ground=FlatGround())
-        again = touching_posture(hume, stands, _feet(), ground=FlatGround())
+        stands = touching_posture(hume, _posture(hume), _feet(), ground=GroundProfile.flat())
+        again = touching_posture(hume, stands, _feet(), ground=GroundProfile.flat())
         np.testing.assert_allclose(again, stands, rtol=0, atol=1e-9)
 
     def test_a_foot_in_the_air_is_named(self, hume):
         q = _posture(hume)
         q[-1] += 0.3
         with pytest.raises(InputError, match=r"foot right_foot is .* mm above .* left_foot"):
-            touching_posture(hume, q, _feet(), ground=FlatGround())
+            touching_posture(hume, q, _feet(), ground=GroundProfile.flat())
 
     def test_springs_at_rest_under_a_command_stiffer_than_they_are(self, hume, springs):
         q = _posture(hume)
@@ -118,7 +118,7 @@ class TestRefused:
             _run(hume, springs, _posture(hume, clearance=-0.02))
 
     def test_foot_inside_raised_ground(self, hume, springs):
-        scene = Scene(feet=_feet(), ground=FlatGround(level=0.05))
+        scene = Scene(feet=_feet(), ground=GroundProfile.flat(0.05))
         with pytest.raises(InputError, match="inside the ground"):
             _run(hume, springs, _posture(hume), scene=scene)
 
@@ -164,7 +164,7 @@ class TestRefused:
 
     def test_torque_limits_that_cannot_hold(self, hume):
         q = _posture(hume)
-        options = {"ground": FlatGround(), "feet": _feet()}
+        options = {"ground": GroundProfile.flat(), "feet": _feet()}
         hold = require_hold(hume, q, torque_limit=np.full(6, 100.0), **options)
         assert hold.use < 1
         assert hold.force[:, 2].sum() == pytest.approx(hume.mass * 9.81, rel=0.2)
@@ -178,7 +178,7 @@ class TestRefused:
     def test_the_weak_joint_is_named_and_not_the_loaded_one(self, tmp_path):
         """Two links held out: 9.81 (0.5 + 1) Nm and 9.81 * 0.5 Nm."""
         arm = chain(tmp_path, count=2, along="x")
-        options = {"ground": FlatGround(), "feet": []}
+        options = {"ground": GroundProfile.flat(), "feet": []}
         limit = np.array([16.0, 4.0])
         with pytest.raises(InputError, match=r"joint joint1 needs at least 4.91 Nm and has 4 Nm"):
             require_hold(arm, np.zeros(2), torque_limit=limit, **options)

@@ -7,7 +7,6 @@ import pytest
 
 from sealag.actuation import actuators
 from sealag.design import certified_bounds, load
-from sealag.errors import ContractionError
 from sealag.robot import Contact, ContactKind, Motion
 from sealag.whole_body import (
     GravityCompensation,
@@ -18,7 +17,6 @@ from sealag.whole_body import (
     TaskKind,
     relative_asymmetry,
     spaces_along,
-    static_joint_state,
 )
 
 HUME = load("bundled:hume")
@@ -182,13 +180,3 @@ def test_lower_levels_do_not_disturb_higher_ones():
     J = np.vstack([row.take(at) for row in BAXTER.law.rows(robot)])[top]
     acceleration = J @ np.linalg.solve(robot.mass_matrix(q), torque)
     assert np.abs(acceleration).max() < 1e-6 * np.abs(torque).max()
-
-
-def test_static_joint_state_solves_its_equation():
-    K, A = np.array([300.0, 500.0]), np.array([[120.0, 30.0], [30.0, 90.0]])
-    theta = np.array([0.3, -0.2])
-    state = static_joint_state(theta, lambda q: -A @ q, K)
-    np.testing.assert_allclose(theta, state.q_joint + (-A @ state.q_joint) / K, atol=1e-11)
-    assert 0.0 < state.contraction < 1.0
-    with pytest.raises(ContractionError, match="stiffer"):
-        static_joint_state(theta, lambda q: -5.0 * A @ q, K)

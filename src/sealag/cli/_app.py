@@ -219,15 +219,21 @@ def simulate(
 
 @app.command()
 def paper(
+    project: Annotated[
+        str, typer.Argument(help="Project file of Hume with a [walking] section.")
+    ] = "bundled:hume",
     out: Annotated[Path, typer.Option("--out", help="Folder for page and CSVs.")] = Path(
         "out/paper"
     ),
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Only a few cases of each table, in about a minute.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Reproduce the paper's figures and check its claims one by one."""
     from sealag.cli._commands import write_paper
 
-    write_paper(out, as_json=as_json)
+    write_paper(project, out, quick=quick, as_json=as_json)
 
 
 def show_json(answer: dict[str, Any]) -> None:

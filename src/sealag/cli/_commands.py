@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
 
 LONGEST_HORIZON_MS = 1e6
+STUDY = "humanoids2016"
+"""The package that reproduces the paper: a guest, which the library does not import."""
 LARGEST_LIST = 250
 """Checks that hold and are shown one by one."""
 
@@ -249,12 +252,24 @@ def _second(path: Path, *, as_json: bool) -> int:
     return 0 if valid else 1
 
 
-def write_paper(out: Path, *, as_json: bool) -> None:
-    """Compute and write the paper page."""
-    from sealag.cli._paper import make_paper
-
+def write_paper(project: str, out: Path, *, quick: bool, as_json: bool) -> None:
+    """Let the study of the paper compute and write its page."""
+    try:
+        study = import_module(STUDY)
+    except ModuleNotFoundError as error:
+        if error.name != STUDY:
+            raise
+        raise FileError(
+            f"The study of the paper is not installed: Python finds no package {STUDY}. It comes "
+            "with sealag's wheel; in a checkout run make setup."
+        ) from error
     make_folder(out)
-    answer = make_paper(out, progress=lambda text: print(text, file=sys.stderr, flush=True))
+    answer = study.reproduce(
+        out,
+        project=project,
+        quick=quick,
+        progress=lambda text: print(text, file=sys.stderr, flush=True),
+    )
     if as_json:
         show_json(answer)
     else:

@@ -13,9 +13,8 @@ from sealag.cli._commands import compile_kernels
 from sealag.design import System, load, resolve_project, scenario_duration, simulate
 from sealag.errors import InputError
 from sealag.files import check_output
-from sealag.paper import WalkCase, measure_walk
 from sealag.report import write_run
-from sealag.simulation import Outcome, Passivity, Run
+from sealag.simulation import Outcome, Passivity, Run, measure_gait
 from sealag.typing import Array
 
 T = TypeVar("T")
@@ -165,15 +164,12 @@ def gait_summary(system: System, run: Run) -> dict[str, Any]:
     """
     walking = system.walking
     assert walking is not None
-    case = WalkCase(
-        terrain=walking.terrain, gait=walking.gait, options=walking.options, steps=walking.steps
-    )
-    walk = measure_walk(system.robot, run, case, task=np.zeros((0, system.robot.n)))
+    gait = measure_gait(system.robot, run, walking)
     return {
-        "steps": walk.steps,
-        "apex_speed_m_s": walk.apex_speed.tolist(),
-        "step_width_m": walk.step_width.tolist(),
-        "gait": walk.is_gait,
+        "steps": gait.steps,
+        "apex_speed_m_s": gait.apex_speed.tolist(),
+        "step_width_m": gait.step_width.tolist(),
+        "gait": gait.is_gait,
     }
 
 

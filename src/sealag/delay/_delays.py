@@ -158,11 +158,6 @@ class Delays:
             )
 
     @property
-    def d_0(self) -> float:
-        """Upper bound of the same delay as d_1, s."""
-        return self.d_1
-
-    @property
     def d_1(self) -> float:
         """Upper bound of the position feedback's total delay, s."""
         up = self.central.up.late_bound(self.embedded_period or self.sample_time)
@@ -185,27 +180,6 @@ class Delays:
             return None
         period = self.embedded_period or self.sample_time
         return self.embedded.up.late_bound(period) + 2.0 * self.embedded_period
-
-    def d_1_at(self, t: float | Array) -> float | Array:
-        """Return the position feedback's total delay with its mean hold of half a period.
-
-        Jitter and losses are left out.
-
-        Args:
-            t: s.
-        """
-        return self.central.at(t) + self.embedded.down.delay.at(t) + 0.5 * self.sample_time
-
-    def d_2_at(self, t: float | Array) -> float | Array:
-        """Return the feedforward path's delay with its mean hold of half a period.
-
-        Jitter and losses are left out.
-
-        Args:
-            t: s.
-        """
-        down = self.central.down.delay.at(t) + self.embedded.down.delay.at(t)
-        return down + 0.5 * self.sample_time
 
     def sampled(self) -> "Delays":
         """Return the delays of a controller that runs: with a period, whose hold counts.

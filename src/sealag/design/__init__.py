@@ -8,17 +8,15 @@ from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
 from sealag.design._project import load, parse_project, resolve_project
 from sealag.design._recheck import verify_design
-from sealag.design._simulate import scenario_duration, simulate, walk_scene
+from sealag.design._simulate import scenario_duration, simulate
 from sealag.design._starter import starter_project
 from sealag.design._system import Source, System
-from sealag.design._walking import Walking
 
 __all__ = [
     "Local",
     "LocalMargins",
     "Source",
     "System",
-    "Walking",
     "assumptions_of",
     "certified_bounds",
     "certify",
@@ -37,5 +35,4 @@ __all__ = [
     "simulate",
     "starter_project",
     "verify_design",
-    "walk_scene",
 ]

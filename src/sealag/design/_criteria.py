@@ -21,7 +21,7 @@ designs; ten times more is refused by `verify`."""
 
 PROOF_SHARE = 1.0 - 1e-7
 """Delays are certified this far below their supremum, where a multiplier has room for rounding. Ten
-times closer, `verify` without --exact is in doubt; ten times further costs a millionth of the delay."""
+times closer, `verify` without --exact is in doubt; ten times further costs 1e-6 of the delay."""
 
 POLYTOPE_WIDTH = 20
 """Intervals between instants in one window of the time-varying bound."""

@@ -298,7 +298,7 @@ class _Decision:
         S, K = links.Z[system.robot.nv_base :], np.diag(system.actuators.spring_stiffness)
         force = system.robot.gravity(q)
         force[system.robot.nv_base :] -= springs
-        weight = max(9.81 * system.robot.mass, float(np.abs(springs).max(initial=0.0)))
+        weight = max(system.robot.weight, float(np.abs(springs).max(initial=0.0)))
         if np.abs(links.Z.T @ force).max(initial=0.0) > _AT_REST * weight:
             return None
         if np.linalg.matrix_rank(S) < S.shape[1]:

@@ -10,10 +10,8 @@ import numpy as np
 from sealag.design._criteria import certified_bounds
 from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
-from sealag.design._walking import Walking
 from sealag.errors import InputError, either
-from sealag.locomotion import FlatTerrain, begin_walk
-from sealag.robot import Contact, ContactKind
+from sealag.robot import ContactKind
 from sealag.simulation import (
     Clock,
     FallLimits,
@@ -29,6 +27,7 @@ from sealag.simulation import (
     touching_posture,
 )
 from sealag.typing import Array
+from sealag.walking import GroundProfile, Walking, begin_walk
 from sealag.whole_body import Controller, TaskKind, TickController
 
 LONGEST_STEP = 1e-3
@@ -178,48 +177,22 @@ def _walking(system: System) -> Walking:
     return system.walking
 
 
-def walk_scene(walking: Walking, pushes: Sequence[Push] = ()) -> Scene:
-    """Return what surrounds a walk: its ground and two point feet.
-
-    Args:
-        walking: the walk.
-        pushes: disturbing forces.
-    """
-    feet = [
-        Foot(
-            contact=Contact(frame=frame, kind=ContactKind.POINT),
-            friction=walking.friction,
-            radius=walking.gait.foot_radius,
-        )
-        for frame in walking.feet
-    ]
-    return Scene(feet=feet, ground=walking.terrain, pushes=pushes)
-
-
 def _on_the_spot(walking: Walking) -> Walking:
     gait = replace(walking.gait, apex_speed=_SPOT_SPEED)
-    return replace(walking, gait=gait, terrain=FlatTerrain())
+    return replace(walking, gait=gait, ground=GroundProfile.flat())
 
 
 def _walk(system: System, walking: Walking, pushes: Sequence[Push], common: dict[str, Any]) -> Run:
-    controller, q, v, theta = begin_walk(
-        system.robot,
-        system.actuators,
-        walking.terrain,
-        feet=walking.feet,
-        gait=walking.gait,
-        options=walking.options,
-        period=common["clock"].central,
-    )
+    start = begin_walk(system.robot, system.actuators, walking, period=common["clock"].central)
     return closed_loop(
         system.robot,
         system.actuators,
-        controller,
-        q=q,
-        v=v,
-        theta=theta,
-        theta_dot=v[-system.robot.n :],
-        scene=walk_scene(walking, pushes),
+        start.controller,
+        q=start.q,
+        v=start.v,
+        theta=start.theta,
+        theta_dot=start.theta_dot,
+        scene=Scene.of_walk(walking, pushes),
         **common,
     )
 
@@ -276,7 +249,7 @@ def _pushes(system: System, kind: str) -> list[Push]:
     if kind == "balance" and not pushes:
         frames = [t.frame for t in system.law.tasks if t.frame and t.kind is not TaskKind.COM]
         frame = frames[0] if frames else system.robot.joints[-1]
-        force = 0.05 * system.robot.mass * 9.81
+        force = 0.05 * system.robot.weight
         pushes = [Push(frame=frame, force=(force, 0.0, 0.0), start=0.2, duration=0.1)]
     return pushes
 

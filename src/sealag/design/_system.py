@@ -11,11 +11,11 @@ import numpy as np
 from sealag.actuation import Actuators
 from sealag.delay import Delays
 from sealag.design._schema import SimulationSection
-from sealag.design._walking import Walking
 from sealag.errors import InputError
 from sealag.passivity import Criterion
 from sealag.robot import Contact, Motion, Robot, require_within_limits
 from sealag.typing import Array, ArrayLike
+from sealag.walking import Walking
 from sealag.whole_body import (
     Controller,
     FrozenLoop,

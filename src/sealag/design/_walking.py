@@ -1,50 +1,16 @@
-"""The [walking] section: what walks where, and how."""
+"""The [walking] section of a project file."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from enum import StrEnum
 from typing import Any
 
 from sealag.errors import InputError, either, near
-from sealag.locomotion import (
-    FlatTerrain,
-    Terrain,
-    WalkingGait,
-    WalkingOptions,
-    paper_terrain,
-    rough_terrain,
-    stairs,
-)
 from sealag.robot import Robot
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Walking:
-    """A walk that a project describes.
-
-    Attributes:
-        feet: frames of the left and the right foot.
-        steps: how many steps are asked for.
-        friction: Coulomb coefficient of the feet.
-        terrain: the ground.
-        gait: the plan.
-        options: means and gains of the walking controller.
-    """
-
-    feet: tuple[str, str]
-    steps: int
-    friction: float
-    terrain: Terrain
-    gait: WalkingGait
-    options: WalkingOptions
-
-    @property
-    def duration(self) -> float:
-        """Time for the steps and half of the next, s."""
-        return round((self.steps + 0.5) * self.gait.step_time, 3)
+from sealag.walking import Ground, GroundProfile, Walking, WalkingGait, WalkingOptions
 
 
 def walking_of(section: Any, robot: Robot) -> Walking | None:
-    """Turn a [walking] section into what it describes.
+    """Turn a [walking] section into the walk that it describes.
 
     Args:
         section: the parsed section; None if the project has none.
@@ -61,22 +27,22 @@ def walking_of(section: Any, robot: Robot) -> Walking | None:
         feet=(left, right),
         steps=section.steps,
         friction=section.friction,
-        terrain=_terrain(section.terrain),
+        ground=_ground(section.terrain),
         gait=_filled(WalkingGait, section.gait, "walking.gait"),
         options=_filled(WalkingOptions, section.options, "walking.options"),
     )
 
 
-def _terrain(keys: Any) -> Terrain:
+def _ground(keys: Any) -> Ground:
     match keys.kind:
         case "flat":
-            return FlatTerrain()
+            return GroundProfile.flat()
         case "rough":
-            return rough_terrain(keys.seed, amplitude=keys.amplitude_m)
+            return GroundProfile.rough(keys.seed, amplitude=keys.amplitude_m)
         case "stairs":
-            return stairs(keys.rises_m, run=keys.run_m)
+            return GroundProfile.stairs(keys.rises_m, run=keys.run_m)
         case _:
-            return paper_terrain()
+            return GroundProfile.paper()
 
 
 def _filled(kind: type, values: dict[str, Any], where: str) -> Any:

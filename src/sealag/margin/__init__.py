@@ -2,16 +2,13 @@
 
 from sealag.margin._crossings import Crossing
 from sealag.margin._margin import DelayMargin, Interval, delay_margin, delay_margins
-from sealag.margin._random_plants import SeaPlant, random_sea_plant
 from sealag.margin._roots import rightmost_roots
 
 __all__ = [
     "Crossing",
     "DelayMargin",
     "Interval",
-    "SeaPlant",
     "delay_margin",
     "delay_margins",
-    "random_sea_plant",
     "rightmost_roots",
 ]

@@ -198,7 +198,7 @@ def prepare(
 
     Raises:
         InputError: a matrix cannot be used.
-        SolverError: a symmetry is none.
+        SolverError: A_0, A_1 or A_e moves a symmetry.
     """
     from scipy.linalg import matrix_balance
 
@@ -254,8 +254,8 @@ def _neutral(parts: tuple[Array, ...], *, symmetries: ArrayLike | None) -> tuple
     lost = np.abs(stacked @ basis).max()
     if lost > _STRUCTURE * np.abs(stacked).max():
         raise SolverError(
-            "A column v of symmetries is moved by the dynamics, so it is none: A_0 v, A_1 v or "
-            f"A_e v is {lost:.2g} instead of 0."
+            "A column v of symmetries is no symmetry of the loop: A_0 v, A_1 v or A_e v is "
+            f"{lost:.2g} instead of 0."
         )
     newest = basis
     inverse = np.linalg.pinv(stacked, rcond=1e-12)

@@ -64,8 +64,8 @@ class DelayMargin:
         guaranteed: whether everything outside the crossings was excluded (up to rounding). False
             where a root lies at zero whatever the delay: it hides the slowest crossings, so that
             `first_crossing` may be too late there, while `delay` is 0. False too where rounding
-            does not tell a contact at zero frequency, which takes for ever, from a crossing beside
-            it, which takes very long.
+            does not separate a touch at zero frequency, which needs an infinite delay, from a
+            crossing at a very low one, which needs a very long delay.
         residual: relative residual of the characteristic equation at the first crossing.
         method: how it was found.
     """
@@ -134,9 +134,10 @@ def delay_margin(
         The margin.
 
     Raises:
-        InputError: matrices do not fit or are not finite real numbers, or a time is none.
-        SolverError: a symmetry is none, a band could be neither excluded nor explained, or a check
-            contradicts the answer.
+        InputError: matrices do not fit or are not finite real numbers, or a time is negative or
+            not finite.
+        SolverError: A_0, A_1 or A_e moves a symmetry, a band could be neither excluded nor
+            explained, or a check contradicts the answer.
     """
     if horizon is not None and time_of("horizon", horizon) == 0.0:
         raise InputError("horizon is 0 s; a positive time is needed.")

@@ -114,7 +114,7 @@ def _differentiation(N: int) -> Array:
 
 
 def _newton(loop: Loop, delay: float, root: complex) -> complex:
-    """Newton on the smallest singular direction; the start where it wanders off."""
+    """Newton on the smallest singular direction; the start where it does not converge."""
     start, longest = root, max(_pieces(loop, delay))
     for _ in range(12):
         factor = np.exp(-root * delay)

@@ -13,7 +13,6 @@ from sealag.passivity._problem import Problem, symmetric, transposed
 from sealag.passivity._solvers import ClarabelDirect, Solver
 from sealag.typing import Array, BoolArray
 
-
 _TURNS = 100
 """Steps in which the angle of the worst motion settles; it takes 2 to 5."""
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from sealag.constants import GRAVITY
 from sealag.errors import InputError, UnknownNameError, near
 from sealag.robot._contact import Contact
 from sealag.robot._mimic import Coupling, Follower, couple
@@ -94,6 +95,11 @@ class Robot:
     def nq(self) -> int:
         """Number of configuration entries."""
         return self.n + (7 if self.floating_base else 0)
+
+    @property
+    def weight(self) -> float:
+        """Gravity force on everything that moves, N."""
+        return self.mass * GRAVITY
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave scratch memory out of a pickle."""
@@ -205,6 +211,14 @@ class Robot:
             q: (…, nq).
         """
         return np.asarray(q, dtype=float)[..., self.nq - self.n :]
+
+    def joint_velocities(self, v: ArrayLike) -> Array:
+        """Return the joints' part (…, n) of velocities.
+
+        Args:
+            v: (…, nv).
+        """
+        return np.asarray(v, dtype=float)[..., self.nv - self.n :]
 
     def integrate(self, q: ArrayLike, v: ArrayLike) -> Array:
         """Move a configuration along a tangent vector.

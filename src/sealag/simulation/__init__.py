@@ -3,7 +3,8 @@
 from sealag.simulation._audit import Audit, Passivity
 from sealag.simulation._delay_store import delay_store
 from sealag.simulation._exchange import Ages, Exchanges
-from sealag.simulation._ground import FlatGround, Foot, Ground
+from sealag.simulation._gait import MeasuredGait, measure_gait
+from sealag.simulation._ground import Foot
 from sealag.simulation._hold import Hold, require_hold, static_hold, touching_posture
 from sealag.simulation._loop import closed_loop
 from sealag.simulation._network import Clock, Network
@@ -20,10 +21,9 @@ __all__ = [
     "EventKind",
     "Exchanges",
     "FallLimits",
-    "FlatGround",
     "Foot",
-    "Ground",
     "Hold",
+    "MeasuredGait",
     "Network",
     "Outcome",
     "Passivity",
@@ -35,6 +35,7 @@ __all__ = [
     "closed_loop",
     "delay_store",
     "fastest_link",
+    "measure_gait",
     "require_hold",
     "static_hold",
     "touching_posture",

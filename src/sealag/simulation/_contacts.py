@@ -6,10 +6,11 @@ import numpy as np
 
 from sealag.errors import InputError
 from sealag.robot import Robot
-from sealag.simulation._ground import Foot, Ground, contact_frame
+from sealag.simulation._ground import Foot, contact_frame
 from sealag.simulation._instant import Instant
 from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.typing import Array, IntArray
+from sealag.walking import Ground
 
 MARGIN = 1e-9  # m and body weights: a contact this close to changing is at its change
 _NEAR = 1e-7  # m, m/s: points this near take part in the same change
@@ -71,7 +72,7 @@ class Contacts:
         self.sizes = (
             robot.nq, robot.nv, robot.n, self.count, self.total, len(feet), len(frames),
         )  # fmt: skip
-        self._weight = robot.mass * 9.81
+        self._weight = robot.weight
         self._radius = np.array([foot.radius for foot in owners], dtype=float)
         # How far below the ground a point may be that opened but has not risen: several points of
         # one sole share its load, and those without any must not strike again and again.

@@ -1,42 +1,14 @@
-"""Feet and what they stand on."""
+"""Feet, and the contact frame where they stand."""
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from sealag.errors import InputError
 from sealag.robot import Contact, ContactKind
 from sealag.typing import Array
-
-
-class Ground(Protocol):
-    """A terrain: anything with a height, in m, over the horizontal plane."""
-
-    def height(self, x: float, y: float) -> float:
-        """Return the height (m) at a point.
-
-        Args:
-            x: World x, m.
-            y: World y, m.
-        """
-        ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FlatGround:
-    """A horizontal plane.
-
-    Attributes:
-        level: Its height, m.
-    """
-
-    level: float = 0.0
-
-    def height(self, x: float, y: float) -> float:
-        """Return the level (m), whatever ``x`` and ``y`` (m)."""
-        return self.level
+from sealag.walking import Ground
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,16 +66,14 @@ class Foot:
 def contact_frame(ground: Ground, x: float, y: float) -> Array:
     """Return the contact frame at a point of the ground: rows tangent, tangent, normal (3, 3).
 
-    The normal follows from ``ground.normal(x, y)`` where the terrain has one, else from central
+    The normal is ``ground.normal(x, y)`` where the ground has one, else from central
     differences of the height over 1 mm.
 
     Args:
-        ground: The terrain.
+        ground: The ground.
         x: World x, m.
         y: World y, m.
     """
-    if isinstance(ground, FlatGround):
-        return np.eye(3)
     normal_of = getattr(ground, "normal", None)
     if normal_of is not None:
         normal = np.array(normal_of(x, y), dtype=float)

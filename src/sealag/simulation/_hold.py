@@ -7,8 +7,9 @@ import numpy as np
 
 from sealag.errors import InputError, SolverError
 from sealag.robot import Robot
-from sealag.simulation._ground import Foot, Ground, contact_frame
+from sealag.simulation._ground import Foot, contact_frame
 from sealag.typing import Array
+from sealag.walking import Ground
 
 _TOUCHING = 1e-4  # m
 _FAR = 0.01  # m: further from the ground than a rounded posture leaves a foot
@@ -62,7 +63,7 @@ def static_hold(
     g, base = robot.gravity(q), robot.nv_base
     A, b = _cones(mu[touching])
     # Variables: contact forces, then the largest unbalance or the largest relative torque.
-    weight = robot.mass * 9.81
+    weight = robot.weight
     balance = _chebyshev(G[:, :base].T, g[:base], np.full(base, weight), A, b, None)
     tied = (G[:, :base].T, g[:base], balance[-1] * weight + 1e-9 * weight)
     scale = np.where(np.isfinite(torque_limit), torque_limit, 1e6)

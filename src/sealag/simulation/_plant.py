@@ -17,11 +17,12 @@ from sealag.actuation import Actuators, motor_parameters
 from sealag.errors import InputError
 from sealag.robot import Robot
 from sealag.simulation._contacts import MARGIN, Contacts
-from sealag.simulation._ground import FlatGround, Foot, Ground
+from sealag.simulation._ground import Foot
 from sealag.simulation._instant import Instant
 from sealag.simulation._ledger import Ledger
 from sealag.simulation._outcome import EventKind, Outcome, PlantStop
 from sealag.typing import Array, IntArray
+from sealag.walking import Ground, GroundProfile
 
 FASTEST = 1e4  # rad/s, m/s: beyond any physical range
 _EVENTS_PER_STEP = 60
@@ -91,7 +92,7 @@ class Plant:
         self._kernel, self._contact = plant, contact
         self.robot, self.actuators, self.step_length = robot, actuators, step
         self.contacts = Contacts(
-            robot, feet, ground or FlatGround(), loaded_frames, stabilisation=stabilisation,
+            robot, feet, ground or GroundProfile(), loaded_frames, stabilisation=stabilisation,
             stop_time=step,
         )  # fmt: skip
         n, nv, self._sizes = robot.n, robot.nv, self.contacts.sizes

@@ -3,9 +3,12 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Self
 
 from sealag.errors import InputError
-from sealag.simulation._ground import FlatGround, Foot, Ground
+from sealag.robot import Contact, ContactKind
+from sealag.simulation._ground import Foot
+from sealag.walking import Ground, GroundProfile, Walking
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +66,25 @@ class Scene:
     """
 
     feet: Sequence[Foot] = ()
-    ground: Ground = field(default_factory=FlatGround)
+    ground: Ground = field(default_factory=GroundProfile)
     pushes: Sequence[Push] = ()
     fall: FallLimits | None = field(default_factory=FallLimits)
     stabilisation: float = 50.0
+
+    @classmethod
+    def of_walk(cls, walking: Walking, pushes: Sequence[Push] = ()) -> Self:
+        """Return what surrounds a walk: its ground and two point feet.
+
+        Args:
+            walking: The walk.
+            pushes: Disturbing forces.
+        """
+        feet = [
+            Foot(
+                contact=Contact(frame=frame, kind=ContactKind.POINT),
+                friction=walking.friction,
+                radius=walking.gait.foot_radius,
+            )
+            for frame in walking.feet
+        ]
+        return cls(feet=feet, ground=walking.ground, pushes=pushes)

@@ -68,7 +68,7 @@ class Controller:
         return self._signal.tank_energy
 
     def reset(self, t: float, measurement: Measurement) -> None:
-        """Forget the past: fill the tank, start q̄(θ) and x̂ anew.
+        """Reset: fill the tank, take q̄(θ) and x̂ from the measurement.
 
         Args:
             t: first instant, s.

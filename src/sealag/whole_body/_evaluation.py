@@ -31,8 +31,8 @@ _REPEATS = 50
 class LawEvaluation:
     """l = J*ᵀ S x̃ + ḡ and all that it is made of, at joint angles that a signal chooses.
 
-    The configuration is moved from the measured one along the contact-consistent motions
-    overline(UN_s), by the difference between the chosen and the measured joint angles.
+    The configuration is the measured one, moved by overline(UN_s) (q_chosen − q_measured): the base
+    follows the chosen joint angles as contacts demand.
 
     Attributes:
         robot: the robot.
@@ -124,12 +124,12 @@ class LawEvaluation:
         return float(np.linalg.norm(F / np.outer(root, root), 2))
 
     def follow(self, q: Array) -> None:
-        """Evaluate at a configuration, and let the base follow the joints as it does there."""
+        """Evaluate at a configuration, and take overline(UN_s) from there."""
         self.at(q, self.robot.joint_positions(q), self._unused)
         self.keep_following()
 
     def keep_following(self) -> None:
-        """Let the base follow the joints as it does where the law was last evaluated."""
+        """Take overline(UN_s) from where the law was last evaluated."""
         self._along[:] = self.space.joint_from_base
 
     def at(self, q: Array, joints: Array, out: Array) -> None:
@@ -147,7 +147,7 @@ class LawEvaluation:
             raise RobotError(f"The mass matrix of {self.robot.name} is not positive definite.")
 
     def settled(self, evaluate: Callable[[], None], away: Callable[[], Array]) -> None:
-        """Evaluate again until the base follows as it does where the law is evaluated.
+        """Evaluate again until overline(UN_s) is that of the configuration evaluated.
 
         Args:
             evaluate: evaluates the law at a signal.
@@ -161,7 +161,7 @@ class LawEvaluation:
                 return
 
     def torque(self, out: Array) -> None:
-        """Write l (n,) of the error and the matrices that stand here now."""
+        """Write l (n,) of the current error and matrices."""
         gravity = self.space.gravity if self.gravity_is_fed_back else self.planned_gravity
         self._kernel.task_torque(self.space.J_star, self.space.stiffness, self.error, gravity, out)
 
@@ -173,7 +173,7 @@ class LawEvaluation:
             )
 
     def static(self, q: Array, theta: Array, sag: Array, iterations: int, out: Array) -> None:
-        """Evaluate at q̄(θ) of Eqs. (15), (16), by Newton's method from a sag q̄ − θ, moved.
+        """Evaluate at q̄(θ) of Eqs. (15), (16), by Newton's method from a sag q̄ − θ, in place.
 
         The springs carry the law there, l(q̄) = K (θ − q̄) = −K sag, so that the last step needs no
         new evaluation.

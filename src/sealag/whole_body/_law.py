@@ -65,7 +65,7 @@ class Law:
         ):
             found = word(kind, getattr(self, name), what=f"The law's {name}")
             object.__setattr__(self, name, found)
-        if isinstance(self.signal, type) or not hasattr(self.signal, "motor_stiffness"):
+        if not isinstance(self.signal, Signal):
             raise InputError(
                 f"The law's signal is {self.signal!r}; MotorAngles(), LinkAngles(), StaticJoint() "
                 "or Tank() is right."

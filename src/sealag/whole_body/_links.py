@@ -1,4 +1,4 @@
-"""The links about a configuration: contacts eliminated, gravity and contact forces linearised."""
+"""Links near rest: contacts eliminated, gravity and contact forces linearised."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,8 @@ from sealag.typing import Array
 
 _STEP = 1e-5  # rad, m: half the base of central differences of gravity and contact forces
 _LOST = 1e-9
-"""Share of a Jacobian's norm below which a motion counts as free: rounding leaves 1e-15, a contact
-that holds a motion at all leaves far more."""
+"""Share of a Jacobian's norm below which a motion counts as free. Rounding leaves 1e-15, so ten
+times smaller is safe too; ten times larger frees motions that a long lever still holds."""
 
 _RIGID = 1e-7  # of the largest: rigid motions of the whole robot that contacts leave
 

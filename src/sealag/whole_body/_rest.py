@@ -18,11 +18,12 @@ _BALANCED = 1e-10
 ten times larger the margin's last digits move."""
 
 _ROUNDING = 1e-15
-"""rad: of an angle, which a spring turns into torque. Stiffer springs than 1e5 times the weight
-balance no better; a hundred times larger would let ordinary ones rest too soon."""
+"""rad: rounding of an angle, times K a torque. It matters only for springs stiffer than 1e5 times
+the weight; a hundred times larger would stop the search too early for ordinary springs."""
 
 _AT_POSTURE = 1e-7
-"""The same of gravity that contacts must balance in the posture, whose angles are rounded."""
+"""The same share, of gravity that contacts must balance in the posture. Project files round angles:
+ten times smaller refuses postures given with seven digits; ten times larger accepts a push."""
 
 _PLACED = 1e-12  # m, rad: how far a contact may be from where the posture has it
 _ROUNDS = 60
@@ -42,7 +43,7 @@ class Rest:
         tau_sea: (n,) spring torque there, Nm.
         found: whether all balances: links, springs, motors and contacts.
         moved: largest distance of a joint from the posture, rad or m.
-        reason: why there is none, in words; empty if it was found.
+        reason: why there is no equilibrium; empty if there is one.
     """
 
     q: Array
@@ -63,7 +64,7 @@ def rest_of(
 ) -> Rest:
     """Find the equilibrium near a posture that the law holds.
 
-    U^T τ = g − J_sᵀ λ, τ = K (θ − q_j) = τ_osc(q, θ) with contacts where the posture has them, by
+    Uᵀ τ = g − J_sᵀ λ, τ = K (θ − q_j) = τ_osc(q, θ) with contacts where the posture has them, by
     Newton's method with the derivative of the law that runs. A law that compensates gravity at the
     static joint state rests at the posture; one that feeds back motor angles sags.
 
@@ -124,15 +125,18 @@ class _Search:
         self._signal: SignalState = law.signal.start(evaluation, delay_bound=0.0)
         self._plant = LinkPlant(robot, contacts)
         self._places = self._plant.places(self._posture)
-        self._scale = max(9.81 * robot.mass, float(np.abs(robot.gravity(posture)).max()), 1e-3)
+        self._scale = max(robot.weight, float(np.abs(robot.gravity(posture)).max()), 1e-3)
 
     def run(self) -> Rest:
-        """Return the equilibrium, or the posture with why there is none."""
+        """Return the equilibrium; without one the posture, with the reason."""
         if self._robot.floating_base and not self._places:  # nothing holds the robot: it falls
             return self._answer(self._posture, self._held(), self._why())
+        posture = self.posture()
+        if posture.found and self._evaluation.law.rests_at_posture:
+            return posture
         try:
             # Where contacts do not balance the posture, its margin is 0 wherever the loop rests.
-            for falling in (True, False) if self.posture().found else (True,):
+            for falling in (True, False) if posture.found else (True,):
                 found = self._follow(falling=falling)
                 if found is not None:
                     return self._answer(*found, "")
@@ -171,7 +175,7 @@ class _Search:
         reason = "" if balanced else self._why()
         return Rest(
             q=q,
-            theta=joints + self._signal.wound(carried),
+            theta=joints + self._signal.deflection(carried),
             tau_sea=carried,
             found=not reason,
             moved=0.0,

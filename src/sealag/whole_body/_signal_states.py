@@ -1,4 +1,4 @@
-"""Signals that run: what moves the law from tick to tick, and how it answers to small motions."""
+"""Running signals: the fed-back angles from tick to tick, and the law's derivative at rest."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -77,7 +77,7 @@ class SignalState(Protocol):
     """A signal that runs: it moves the law from tick to tick."""
 
     def reset(self, t: float, measurement: Measurement) -> None:
-        """Forget the past.
+        """Clear the memory.
 
         Args:
             t: first instant, s.
@@ -86,7 +86,7 @@ class SignalState(Protocol):
         ...
 
     def command(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Write τ_osc of a measurement, and move the memory.
+        """Write τ_osc of a measurement, and advance the memory.
 
         Args:
             t: the controller's clock, s.
@@ -104,8 +104,8 @@ class SignalState(Protocol):
         """
         ...
 
-    def wound(self, carried: Array) -> Array:
-        """Return θ − q_j (n,) at which the tasks have no error.
+    def deflection(self, carried: Array) -> Array:
+        """Return the spring deflection θ − q_j (n,) at which the task error is 0.
 
         Args:
             carried: (n,) torque that springs carry in the posture, Nm.
@@ -138,7 +138,7 @@ class SignalState(Protocol):
 
 
 class MeasuredAngles:
-    """A signal whose angles are measured: nothing is carried from tick to tick."""
+    """Measured motor or link angles; no memory."""
 
     tank_energy = 0.0
 
@@ -150,7 +150,7 @@ class MeasuredAngles:
         return self._law.robot.joint_positions(q) if self._links else theta
 
     def reset(self, t: float, measurement: Measurement) -> None:
-        """Let the base follow as it does at the measurement."""
+        """Take overline(UN_s) of the measurement."""
         self._law.follow(measurement.q)
 
     def command(self, t: float, measurement: Measurement, out: Array) -> None:
@@ -164,8 +164,8 @@ class MeasuredAngles:
         energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
         return Present(energy, self._joints(measurement.q, measurement.theta))
 
-    def wound(self, carried: Array) -> Array:
-        """Return 0 for motor angles, what springs are wound by for link angles."""
+    def deflection(self, carried: Array) -> Array:
+        """Return 0 for motor angles, K⁻¹ ḡ for link angles."""
         return carried / self._law.spring_stiffness if self._links else np.zeros_like(carried)
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
@@ -200,7 +200,7 @@ def _differences(law: "LawEvaluation", function, q: Array, theta: Array, rows: i
 
 
 class StaticState:
-    """q̄(θ), warm-started from tick to tick."""
+    """q̄(θ) by Newton's method, warm-started from tick to tick."""
 
     tank_energy = 0.0
 
@@ -225,7 +225,7 @@ class StaticState:
         energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
         return Present(energy, measurement.theta + sag)
 
-    def wound(self, carried: Array) -> Array:
+    def deflection(self, carried: Array) -> Array:
         """Return K⁻¹ ḡ of the compensation, at which q̄(θ) = q_j."""
         none = self._law.law.gravity is GravityCompensation.NONE
         return np.zeros_like(carried) if none else carried / self._law.spring_stiffness
@@ -243,7 +243,7 @@ class StaticState:
 
 
 class TankState:
-    """The energy tank beside q̄(θ), which u moves x̂ to."""
+    """x̂ of the energy tank; u pulls it to x(q̄(θ))."""
 
     def __init__(self, law: "LawEvaluation", tank: EnergyTank, iterations: int) -> None:
         self._law, self._tank, self._static = law, tank, StaticState(law, iterations)
@@ -262,7 +262,7 @@ class TankState:
         self._static.reset(t, measurement)
 
     def command(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Write τ_osc at x̂, moved by the motors and, if the tank pays, to x(q̄(θ))."""
+        """Write τ_osc at x̂, which follows the motors and, while the tank pays, x(q̄(θ))."""
         law, tank = self._law, self._tank
         self._static.command(t, measurement, out)
         target = law.wanted - law.error
@@ -282,7 +282,7 @@ class TankState:
         law.torque(out)
 
     def _matrices(self, q: Array, theta: Array) -> None:
-        """Take compensation that is fed back at θ, whose gradient it has."""
+        """Evaluate fed-back gravity compensation at θ, so that its gradient is that of F_q."""
         if self._law.gravity_is_fed_back:
             self._law.at(q, theta, self._unused)
 
@@ -298,9 +298,9 @@ class TankState:
         energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy
         return Present(energy, measurement.theta)
 
-    def wound(self, carried: Array) -> Array:
+    def deflection(self, carried: Array) -> Array:
         """Return that of q̄(θ)."""
-        return self._static.wound(carried)
+        return self._static.deflection(carried)
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
         """Write the command once x̂ has come to x(q̄(θ))."""

@@ -1,7 +1,8 @@
-"""What the law is taken at: signals with their stiffness, refusal, potential and memory."""
+"""Fed-back signals: the joint angles at which a law is evaluated, Eqs. (15)-(22)."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,9 @@ from sealag.whole_body._tank import EnergyTank, TankFlow
 if TYPE_CHECKING:
     from sealag.whole_body._evaluation import LawEvaluation
 
-_ENDLESS = 1e-12
-"""Determinant of I − K⁻¹ F_q from which a law is exactly as stiff as its springs."""
+_AS_STIFF_AS_SPRINGS = 1e-12
+"""|det(I − K⁻¹ F_q)| below which a law counts as stiff as its springs, F_θ without bound. Ten times
+larger refuses laws whose F_θ has three digits; ten times smaller keeps F_θ that is rounding."""
 
 
 class Refusal(NamedTuple):
@@ -34,103 +36,69 @@ class Refusal(NamedTuple):
     reason: str
 
 
-class Signal(Protocol):
-    """The signal that a law is taken at."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signal(ABC):
+    """The joint angles at which a law evaluates x, J*, S and ḡ; a new signal is a subclass.
+
+    Attributes:
+        name: its word in project files and certificates.
+        has_potential: whether its feedback is collocated with the motors.
+        rests_at_posture: whether the task error is 0 in the posture although springs carry gravity
+            there, and the signal has no memory.
+    """
 
     name: ClassVar[str]
-    """Its word in project files and certificates."""
-    has_potential: ClassVar[bool]
-    """Whether the feedback of it is collocated with the motors."""
-    rests_at_posture: ClassVar[bool]
-    """Whether its error is 0 in the posture although springs carry gravity there, and nothing is
-    remembered."""
-
-    def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return −∂τ_osc/∂θ (…, n, n) of a law with joint stiffness F_q (…, n, n), springs K (n,);
-        NaN where the signal does not exist. For link angles it acts on them.
-
-        Args:
-            F_q: (…, n, n) joint stiffness of the law, Nm/rad.
-            K: (n,) springs, Nm/rad.
-        """
-        ...
-
-    def refusal(self, contraction: Array) -> Refusal | None:
-        """Return why no passive bound covers it, given the contraction factors (N,).
-
-        Args:
-            contraction: (N,) contraction factors of q̄(θ).
-        """
-        ...
-
-    def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
-        """Return the running signal.
-
-        Args:
-            law: what evaluates the law.
-            delay_bound: bound d̄ of the delay that a tank pays for, s.
-        """
-        ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotorAngles:
-    """x(θ): motor angles taken for joint angles. Collocated, −∂τ_osc/∂θ = F_q."""
-
-    name: ClassVar[str] = "motor"
     has_potential: ClassVar[bool] = True
     rests_at_posture: ClassVar[bool] = False
 
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return F_q.
+        """Return F_θ = −∂τ_osc/∂θ, (…, n, n) Nm/rad; F_q where the angles move with the motors.
+
+        NaN where the signal does not exist. For link angles it is −∂τ_osc/∂q_j.
 
         Args:
             F_q: (…, n, n) joint stiffness of the law, Nm/rad.
-            K: (n,) springs, Nm/rad.
+            K: (n,) spring stiffness, Nm/rad.
         """
         return F_q
 
-    def refusal(self, contraction: Array) -> None:
-        """Return None.
+    def refusal(self, contraction: Array) -> Refusal | None:
+        """Return why no passive bound covers the signal; None if one does.
 
         Args:
             contraction: (N,) contraction factors of q̄(θ).
         """
+        return None
 
+    @abstractmethod
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
         """Return the running signal.
 
         Args:
-            law: what evaluates the law.
-            delay_bound: bound d̄ of the delay that a tank pays for, s.
+            law: evaluates the law at joint angles.
+            delay_bound: d̄, the delay that a tank pays for, s.
         """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotorAngles(Signal):
+    """x(θ): motor angles taken for joint angles. Collocated, −∂τ_osc/∂θ = F_q."""
+
+    name: ClassVar[str] = "motor"
+
+    def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
         return MeasuredAngles(law, links=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinkAngles:
-    """x(q_j): link angles. −∂τ_osc/∂q_j = F_q acts across the springs, which no passive bound
-    covers."""
+class LinkAngles(Signal):
+    """x(q_j): link angles. −∂τ_osc/∂q_j = F_q acts across the springs; no passive bound covers
+    it."""
 
     name: ClassVar[str] = "joint"
     has_potential: ClassVar[bool] = False
-    rests_at_posture: ClassVar[bool] = False
-
-    def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return F_q, which acts on link angles.
-
-        Args:
-            F_q: (…, n, n) joint stiffness of the law, Nm/rad.
-            K: (n,) springs, Nm/rad.
-        """
-        return F_q
 
     def refusal(self, contraction: Array) -> Refusal:
-        """Return that it is not collocated.
-
-        Args:
-            contraction: (N,) contraction factors of q̄(θ).
-        """
         return Refusal(
             np.ones(len(contraction), dtype=bool),
             "link angles are fed back, which is not collocated with the motors: no passivity "
@@ -138,17 +106,11 @@ class LinkAngles:
         )
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
-        """Return the running signal.
-
-        Args:
-            law: what evaluates the law.
-            delay_bound: bound d̄ of the delay that a tank pays for, s.
-        """
         return MeasuredAngles(law, links=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StaticJoint:
+class StaticJoint(Signal):
     """x(q̄(θ)) of Eqs. (15)-(17), q̄ the joint angles at which the springs carry the law.
 
     Attributes:
@@ -157,37 +119,31 @@ class StaticJoint:
 
     iterations: int = 2
     name: ClassVar[str] = "static_joint"
-    has_potential: ClassVar[bool] = True
     rests_at_posture: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse to iterate never.
+        """Require at least one iteration.
 
         Raises:
-            InputError: there is no iteration.
+            InputError: there is none.
         """
         if self.iterations < 1:
             raise InputError(f"iterations is {self.iterations}; 1 is the fewest.")
 
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return F_q (I − K⁻¹ F_q)⁻¹, the series of law and springs; NaN where it has no end.
+        """Return F_q (I − K⁻¹ F_q)⁻¹, law and springs in series; NaN where that is singular.
 
         Args:
             F_q: (…, n, n) joint stiffness of the law, Nm/rad.
-            K: (n,) springs, Nm/rad.
+            K: (n,) spring stiffness, Nm/rad.
         """
         F_theta = np.full_like(F_q, np.nan)
         loop = np.swapaxes(np.eye(len(K)) - F_q / K[:, None], -1, -2)
-        ends = np.abs(np.linalg.det(loop)) > _ENDLESS
-        F_theta[ends] = np.linalg.solve(loop[ends], np.swapaxes(F_q, -1, -2)[ends])
+        regular = np.abs(np.linalg.det(loop)) > _AS_STIFF_AS_SPRINGS
+        F_theta[regular] = np.linalg.solve(loop[regular], np.swapaxes(F_q, -1, -2)[regular])
         return np.swapaxes(F_theta, -1, -2)
 
     def refusal(self, contraction: Array) -> Refusal | None:
-        """Return where q̄(θ) is no contraction.
-
-        Args:
-            contraction: (N,) contraction factors of q̄(θ).
-        """
         bad = ~(contraction < 1.0)
         if not bad.any():
             return None
@@ -198,28 +154,11 @@ class StaticJoint:
         )
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
-        """Return the running signal.
-
-        Args:
-            law: what evaluates the law.
-            delay_bound: bound d̄ of the delay that a tank pays for, s.
-        """
         return StaticState(law, self.iterations)
 
 
-def static_contraction(F_q: Array, K: Array) -> Array:
-    """Return ‖K^-½ F_q K^-½‖ (…): below 1 the iteration for q̄(θ) contracts (sufficient).
-
-    Args:
-        F_q: (…, n, n) joint stiffness of the law, gravity compensation included.
-        K: (n,) spring stiffness.
-    """
-    root = np.sqrt(K)
-    return np.linalg.norm(F_q / root[:, None] / root, ord=2, axis=(-2, -1))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tank:
+class Tank(Signal):
     """x̂ of Eqs. (18)-(22): x̂̇ = u + J* θ̇, with u paid for out of an energy tank.
 
     While u is 0, x̂ moves with the motors: −∂τ_osc/∂θ = F_q.
@@ -236,11 +175,9 @@ class Tank:
     flow: TankFlow = TankFlow.CORRECTED
     iterations: int = 2
     name: ClassVar[str] = "static_joint_tank"
-    has_potential: ClassVar[bool] = True
-    rests_at_posture: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be run.
+        """Check energy, rate and iterations.
 
         Raises:
             InputError: energy or rate is negative or not finite, or there is no iteration.
@@ -253,21 +190,7 @@ class Tank:
         if self.iterations < 1:
             raise InputError(f"iterations is {self.iterations}; 1 is the fewest.")
 
-    def motor_stiffness(self, F_q: Array, K: Array) -> Array:
-        """Return F_q: what u does besides is paid for.
-
-        Args:
-            F_q: (…, n, n) joint stiffness of the law, Nm/rad.
-            K: (n,) springs, Nm/rad.
-        """
-        return F_q
-
     def refusal(self, contraction: Array) -> Refusal | None:
-        """Return that the published flow does not pay for all, or that q̄ does not exist.
-
-        Args:
-            contraction: (N,) contraction factors of q̄(θ).
-        """
         if self.flow is TankFlow.PUBLISHED:
             return Refusal(
                 np.ones(len(contraction), dtype=bool),
@@ -277,12 +200,6 @@ class Tank:
         return StaticJoint(iterations=self.iterations).refusal(contraction)
 
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
-        """Return the running signal.
-
-        Args:
-            law: what evaluates the law.
-            delay_bound: bound d̄ of the delay that a tank pays for, s.
-        """
         tank = EnergyTank(
             size=law.rows,
             energy=self.energy,
@@ -311,3 +228,14 @@ def signal_named(name: str) -> Signal:
         if kind.name == name:
             return kind()
     raise UnknownNameError(f"No signal is called {name!r}; there is {either(SIGNAL_NAMES)}.")
+
+
+def static_contraction(F_q: Array, K: Array) -> Array:
+    """Return ‖K^-½ F_q K^-½‖ (…): below 1 the iteration for q̄(θ) contracts (sufficient).
+
+    Args:
+        F_q: (…, n, n) joint stiffness of the law, gravity compensation included.
+        K: (n,) spring stiffness.
+    """
+    root = np.sqrt(K)
+    return np.linalg.norm(F_q / root[:, None] / root, ord=2, axis=(-2, -1))

@@ -23,8 +23,9 @@ from sealag.whole_body._tasks import (
 
 _STEP = 1e-5  # rad: half the base of central differences of gravity compensation
 _BESIDE = 1e-3
-"""rad: how far beside an instant its ranks are compared. Ten times larger meets other postures;
-ten times smaller meets the width over which the rank tolerance drops a direction, 3e-5 rad."""
+"""rad: distance of the neighbouring configurations whose ranks are compared. Ten times larger
+leaves the posture's neighbourhood; ten times smaller comes near the 3e-5 rad over which
+RANK_TOLERANCE drops a direction."""
 
 _EMPTY = 1e-13
 """Share of Λ's largest eigenvalue below which one belongs to a dropped direction: kept ones lie
@@ -49,8 +50,8 @@ class Spaces:
         contraction: (N,) ‖K^{-½} F_q K^{-½}‖, the contraction factor of q̄(θ).
         asymmetry: (N,) ‖F_θ − F_θᵀ‖ / ‖F_θ + F_θᵀ‖.
         gravity: (N, n) compensation torque ḡ, Nm.
-        singular: (N,) whether contacts or tasks lose a direction there that they have beside it, so
-            that F jumps.
+        singular: (N,) whether J_s or J* has a lower rank there than at neighbouring configurations,
+            so that F jumps.
     """
 
     levels: tuple[int, ...]
@@ -213,10 +214,10 @@ def _singular(
     contacts: Sequence[Contact],
     levels: list[int],
 ) -> BoolArray:
-    """Whether configurations (N, nq) have fewer directions than those a little beside them.
+    """Whether ranks at configurations (N, nq) are lower than at neighbouring ones.
 
-    Beside means along contact-consistent motions in two general directions: of a family of
-    postures almost all have the full rank, so that any of them shows what is lost.
+    Neighbours lie along two random contact-consistent motions: almost all configurations of a
+    family have the full rank, so that any of them shows a loss.
     """
     lost = np.zeros(len(q), dtype=bool)
     here = _ranks(robot, at, levels)
@@ -230,7 +231,7 @@ def _singular(
 
 
 def _ranks(robot: Robot, at: _SpacesAt, levels: list[int]) -> Array:
-    """Directions that joints have, and that each level has, (N, 1 + levels)."""
+    """Ranks of the free joint motions and of each level's Λ, (N, 1 + levels)."""
     joints = np.trace(at.along[:, robot.nv_base :], axis1=1, axis2=2)
     columns = [np.round(joints)]
     for first, last in itertools.pairwise(levels):

@@ -17,7 +17,7 @@ TaskArrays: TypeAlias = tuple[IntArray, IntArray, IntArray, Array, Array, Array]
 def read_tasks(
     robot: Robot, law: Law, contacts: tuple[Contact, ...], *, posture: ArrayLike
 ) -> tuple[list[str], TaskArrays]:
-    """Measure what each task shall reach, so that all errors are 0 in a posture.
+    """Return the tasks' references: their positions in a posture, where all errors are 0.
 
     Args:
         robot: the robot.

@@ -1,0 +1,1 @@
+"""Whole-body solvers of others, each in an environment of its own."""

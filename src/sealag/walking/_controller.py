@@ -1,0 +1,260 @@
+"""Walking with springs and delay: whole-body law, weight transfer, steps, all at one tick."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sealag.actuation import Actuators
+from sealag.errors import InputError, SolverError
+from sealag.robot import Robot
+from sealag.typing import Array
+from sealag.walking._estimator import Body, Estimator
+from sealag.walking._feet import Side
+from sealag.walking._options import (
+    JointAngles,
+    Prediction,
+    WalkingOptions,
+)
+from sealag.walking._placement import Placement
+from sealag.walking._start import walking_start
+from sealag.walking._step import StepReferences
+from sealag.walking._walk import Walking
+from sealag.whole_body import Measurement
+
+_DAMPING = 1e-9  # share of the trace: bounds torques near a straight knee
+_LATE_SWING = 0.6  # share of the step after which a touch is a touchdown
+
+
+class WalkingController:
+    """Walks a biped with two point feet and six series elastic joints; one call per tick.
+
+    In single support six tasks take the six joints: CoM height, torso roll and pitch, swing foot.
+    CoM x and y follow the pendulum and are steered by where the next foot lands; yaw is free. The
+    task torque is that of Eqs. (11), (17) written with accelerations: J*ᵀΛ(ẍ_d + K_x x̃ − J̇v)
+    plus Coriolis and gravity torques. In double support the torques of the two single supports
+    are blended: both keep both feet at rest, so their convex combination moves the weight from
+    foot to foot and is continuous.
+
+    Args:
+        robot: Floating base, six actuated joints.
+        actuators: Springs and motors as the controller believes them to be.
+        walking: Feet, gait, means and gains, and the ground as the controller believes it to be.
+        period: Time between two ticks, s.
+
+    Attributes:
+        tau_task: Task torque of the last tick (n,), before feedforward of motor and spring, Nm.
+
+    Raises:
+        InputError: The robot is not such a biped, or the period is not positive.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        actuators: Actuators,
+        walking: Walking,
+        *,
+        period: float = 1e-3,
+    ) -> None:
+        from sealag.kernels import walking_law
+
+        if robot.nv_base != 6 or robot.n != 6:
+            raise InputError(
+                f"walking needs a floating base and 6 actuated joints; {robot.name} has "
+                f"{robot.nv_base} base velocities and {robot.n} joints"
+            )
+        if not (math.isfinite(period) and period > 0.0):
+            raise InputError(f"the controller's period must be a time > 0 s, got {period}")
+        self._kernel, self._robot, self._actuators = walking_law, robot, actuators
+        self._ground, self._period = walking.ground, period
+        self.gait, self.options = walking.gait, walking.options
+        self._body = Body(robot, walking.feet)
+        self._torque_limit = np.where(np.isfinite(robot.effort_limit), robot.effort_limit, 1e3)
+        self._D = np.ascontiguousarray(actuators.motor_damping)
+        self._D_by_K = actuators.motor_damping / actuators.spring_stiffness
+        self._estimator = Estimator(
+            robot, actuators, period=period, prediction=self.options.prediction,
+            odometry=self.options.odometry,
+        )  # fmt: skip
+        self._gains, self._embedded_gains = _gains(self.options, period)
+        self._rates, self._smooth, self._first = np.zeros(robot.n), np.zeros(robot.n), True
+        self.tau_task = np.zeros(robot.n)
+
+    def reset(self, t: float, measurement: Measurement) -> None:
+        """Begin at the apex over the foot that is loaded, in the middle of its step.
+
+        Args:
+            t: First instant, s.
+            measurement: The state then, not delayed.
+
+        Raises:
+            InputError: Not exactly one foot is on the ground.
+        """
+        contact = measurement.contact
+        if contact.size != 2 or (contact > 0.0).sum() != 1:
+            raise InputError("a walk begins with one of two feet on the ground")
+        gait, body = self.gait, self._body
+        body.q[:], body.v[:] = measurement.q, measurement.v
+        body.update()
+        self.placement = Placement(gait, self.options, self._robot.mass)
+        self.step = StepReferences(gait, self._ground, step_length=self.placement.plan.step_length)
+        stance = Side(int(contact.argmax()))
+        feet = body.feet()
+        self.step.start(
+            t,
+            stance,
+            phase=0.5 * (gait.step_time + gait.transfer_time),
+            com=np.array([body.com[0][2], body.com[1][2]]),
+            feet=feet,
+            swing=body.foot_rate(stance.other),
+        )
+        self._estimator.reset(feet, stance)
+        self._first = True
+
+    def tick(self, t: float, measurement: Measurement, out: Array) -> None:
+        """Compute the command tau_osc.
+
+        Args:
+            t: The controller's own clock, s.
+            measurement: The newest that has arrived.
+            out: Where the command (n,) is written, Nm.
+
+        Raises:
+            SolverError: The state has left what the law can be computed for.
+        """
+        options = self.options
+        age = t - measurement.time
+        now = t + (age + options.embedded_delay if options.preview else 0.0)
+        self._observe(measurement, now)
+        self._switch(now, measurement.contact)
+        step, body = self.step, self._body
+        phase = step.phase(now)
+        self.placement.update(
+            phase, step, body.com[0], body.com[1], angular=body.angular, period=self._period
+        )
+        if phase >= self.gait.transfer_time:
+            if not step.swinging:
+                step.lift(body.foot(step.swing_foot))
+            step.move(now, self._period)
+        if not self._tasks(now, phase):
+            raise SolverError("the walking law has no finite torque in this state")
+        if self._first:
+            limit = self._torque_limit
+            self._smooth[:], self._first = self.tau_task.clip(-limit, limit), False
+        self._kernel.carry(
+            self.tau_task, self._torque_limit, self._smooth, self._rates, self._estimator.tau_sea,
+            self._D, self._D_by_K, self._embedded_gains, out,
+        )  # fmt: skip
+        self._estimator.sent(out, t + age + options.embedded_delay)
+
+    def motor_start(self, q: Array, v: Array, *, stance: Side = Side.RIGHT) -> Array:
+        """Return motor angles (n,) whose springs carry the first task torque, rad.
+
+        Args:
+            q: Configuration at the start (nq,).
+            v: Velocity at the start (nv,).
+            stance: Foot stood on.
+        """
+        robot = self._robot
+        first = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n, contacts=2)
+        first.q[:], first.v[:], first.contact[stance] = q, v, 1.0
+        first.theta[:], first.theta_dot[:] = first.q_joint, first.v_joint
+        self.reset(0.0, first)
+        self.tick(0.0, first, np.zeros(robot.n))
+        return first.q_joint + self.tau_task / self._actuators.spring_stiffness
+
+    # State ---------------------------------------------------------------------------------------
+    def _observe(self, measurement: Measurement, now: float) -> None:
+        """Estimate and predict the state, and evaluate the robot's terms there."""
+        options, body, stiffness = self.options, self._body, self._actuators.spring_stiffness
+        body.q[:], body.v[:] = measurement.q, measurement.v
+        if options.feedback == JointAngles.MOTOR:
+            body.q[-6:] = measurement.theta
+        elif options.feedback == JointAngles.STATIC_JOINT:
+            body.q[-6:] = measurement.theta - self.tau_task / stiffness
+        self._estimator.move(
+            body, self.step, theta=measurement.theta, theta_dot=measurement.theta_dot,
+            measured=measurement.time, now=now,
+        )  # fmt: skip
+        if options.prediction == Prediction.NONE:
+            self._estimator.tau_sea[:] = measurement.tau_sea
+
+    def _switch(self, now: float, contact: Array) -> None:
+        """Begin the next step when planned, or when the swing foot is seen on the ground."""
+        step, gait = self.step, self.gait
+        late = step.phase(now) > _LATE_SWING * gait.step_time + 0.4 * gait.transfer_time
+        touched = self.options.early_contact and late and contact[step.swing_foot] > 0.0
+        if touched or step.phase(now) >= gait.step_time - 1e-9:
+            step.change(now, self._body.feet())
+            self.placement.restart()
+
+    # Law -----------------------------------------------------------------------------------------
+    def _tasks(self, now: float, phase: float) -> bool:
+        """Set ``tau_task`` and the planned joint rates; return whether they are finite."""
+        body, step = self._body, self.step
+        still = not self.options.acceleration_feedforward
+        return self._kernel.law(
+            body.terms, body.mounts, body.v, body.gravity() if still else body.terms[1],
+            still, step.height, step.swing, phase,
+            (self.gait.transfer_time, step.height_time(now)), step.stance, self._gains,
+            self.tau_task, self._rates,
+        )  # fmt: skip
+
+
+def _gains(options: WalkingOptions, period: float) -> tuple[Array, Array]:
+    """Return the numbers that the kernels of law and command take."""
+    stiffness = [options.height_stiffness, options.posture_stiffness, options.swing_stiffness]
+    damping = [2.0 * options.task_damping * math.sqrt(k) for k in stiffness]
+    planned = 1.0 if options.acceleration_feedforward else 0.0
+    lead = options.lead_time if options.lead else 0.0
+    keep = math.exp(-period / options.lead_time)
+    forward = 1.0 if options.velocity_feedforward else 0.0
+    return (
+        np.array([*stiffness, *damping, planned, options.position_rate, _DAMPING]),
+        np.array([keep, lead, forward, options.torque_feedback]),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkStart:
+    """A walking controller and the state in which its walk begins.
+
+    Attributes:
+        controller: the controller.
+        q: configuration (nq,).
+        v: velocity (nv,).
+        theta: motor angles (n,) whose springs carry the first task torque, rad.
+        theta_dot: motor speeds (n,), those of the joints, rad/s.
+    """
+
+    controller: WalkingController
+    q: Array
+    v: Array
+    theta: Array
+    theta_dot: Array
+
+
+def begin_walk(
+    robot: Robot, actuators: Actuators, walking: Walking, *, period: float = 1e-3
+) -> WalkStart:
+    """Return a walking controller and the state in which its walk begins, on the right foot.
+
+    Args:
+        robot: Biped with a floating base and six joints.
+        actuators: Springs and motors as the controller believes them to be.
+        walking: What walks where, and how.
+        period: Time between two ticks, s.
+
+    Raises:
+        InputError: The robot is not such a biped, or its legs cannot take the posture.
+    """
+    controller = WalkingController(robot, actuators, walking, period=period)
+    q, v = walking_start(robot, walking)
+    return WalkStart(
+        controller=controller,
+        q=q,
+        v=v,
+        theta=controller.motor_start(q, v),
+        theta_dot=robot.joint_velocities(v),
+    )

@@ -1,0 +1,94 @@
+"""Where the next foot must land, from the predicted end of the step."""
+
+import math
+
+import numpy as np
+
+from sealag.typing import Array
+from sealag.walking._gait import WalkingGait
+from sealag.walking._options import WalkingOptions
+from sealag.walking._step import StepReferences
+
+_FORWARD = (-0.15, 0.55)  # m from the stance foot: what the legs reach
+_WIDEST = 0.5  # m
+_FASTER = 0.3  # largest relative correction of the speed
+
+
+class Placement:
+    """Places the next foot so that the step after it ends at the plan's capture point.
+
+    The present step is integrated to its end with the planned height; what it will end with is a
+    constant of the undisturbed motion, so it is averaged over time. Errors of the capture point
+    are then undone within one step, those of its stable counterpart decay by exp(−ωT) per step.
+
+    Args:
+        gait: The plan.
+        options: Which means are used.
+        mass: The robot's, kg.
+    """
+
+    def __init__(self, gait: WalkingGait, options: WalkingOptions, mass: float) -> None:
+        from sealag.kernels import walking
+
+        self._kernel, self._gait, self._options, self._mass = walking, gait, options, mass
+        self.plan = gait.periodic()
+        plan = self.plan
+        self._numbers = np.array(
+            [
+                gait.step_time, gait.transfer_time, plan.rate, plan.growth, plan.carried,
+                plan.end_forward, plan.end_outward, *_FORWARD, gait.smallest_width, _WIDEST, 1.0,
+            ]
+        )  # fmt: skip
+        self._end, self._momentum = np.zeros((2, 2)), np.zeros(2)
+        self._fresh = True
+        self._started, self._before, self._faster = False, 0.0, 0.0
+
+    def restart(self) -> None:
+        """Forget the average: a new step begins."""
+        self._fresh, self._before = True, 0.0
+
+    def update(
+        self, phase: float, step: StepReferences, com: Array, com_rate: Array, *,
+        angular: Array, period: float,
+    ) -> None:  # fmt: skip
+        """Re-plan the target of the swing foot.
+
+        Args:
+            phase: Time since the step's touchdown, s.
+            step: The step's references; ``target`` is moved.
+            com: (3,) m.
+            com_rate: (3,) m/s.
+            angular: Angular momentum about the CoM (3,), kg m²/s.
+            period: Time since the last call, s.
+        """
+        gait, options, numbers = self._gait, self._options, self._numbers
+        speed, momentum = float(com_rate[0]), self._momentum
+        if options.momentum_placement:
+            weight = self._mass * max(float(com[2] - step.new[2]), 0.4)
+            momentum[0], momentum[1] = angular[1] / weight, -angular[0] / weight
+        self._watch_apex(float(com[0] - step.new[0]), speed, speed + float(momentum[0]))
+        share = 1.0
+        if not self._fresh and options.placement_time > 0.0:
+            share = 1.0 - math.exp(-period / options.placement_time)
+        self._fresh = False
+        faster = 1.0 + (self._faster if options.bias_gain > 0.0 else 0.0)
+        numbers[5], numbers[11] = self.plan.end_forward * faster, step.outward
+        x, y = self._kernel.capture_end(
+            com, com_rate, momentum, step.old, step.new, step.height, step.offset, phase, numbers,
+            share, self._end,
+        )  # fmt: skip
+        if gait.step_time - phase > options.placement_freeze:
+            step.target[0], step.target[1], step.target[2] = x, y, step.foot_height(x, y)
+
+    def _watch_apex(self, ahead: float, speed: float, pendulum: float) -> None:
+        """Integrate the relative error of the apex speed; begin with what the legs' momentum adds.
+
+        At the start, an apex, the CoM moves at the plan's speed and the pendulum more slowly.
+        """
+        planned = self._gait.apex_speed
+        if not self._started:
+            self._started, self._faster = True, (pendulum - speed) / planned
+        elif self._before < 0.0 <= ahead:
+            self._faster += self._options.bias_gain * (planned - speed) / planned
+            self._faster = min(max(self._faster, -_FASTER), _FASTER)
+        self._before = ahead

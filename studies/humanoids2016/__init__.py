@@ -1,0 +1,94 @@
+"""The paper's figures and statements, computed with sealag and checked one by one."""
+
+from humanoids2016._ablation import (
+    PUBLISHED_LAW,
+    AblationTable,
+    ablation_cases,
+    ablation_table,
+    gait_cases,
+)
+from humanoids2016._beyond import HELD_OUT, DelayMap, beyond_cases, delay_map
+from humanoids2016._claims import Claim, Verdict
+from humanoids2016._figure4 import (
+    CertifiedVariant,
+    Figure4,
+    figure_4,
+    figure_4_claims,
+    simulated_motion,
+)
+from humanoids2016._figure5 import TorqueTrace, figure_5, figure_5_claims, measured_lag
+from humanoids2016._findings import QUICK, Findings, StudySize
+from humanoids2016._paper_page import write_paper_page
+from humanoids2016._random_plants import SeaPlant, random_sea_plant
+from humanoids2016._random_table import (
+    PlantComparison,
+    RandomPlantTable,
+    compare_plant,
+    random_plant_table,
+)
+from humanoids2016._study import planned_walk, reproduce, study
+from humanoids2016._unsafe import UnsafeExample, delayed_margin, unsafe_examples
+from humanoids2016._walk import Walk, WalkCase, at_delay_scale, simulate_walk, walking_of
+from humanoids2016._walk_errors import NoisySensors, SensorNoise, wrong_robot, wrong_springs
+from humanoids2016._walk_table import (
+    WalkRow,
+    gain_cases,
+    robustness_cases,
+    rough_grounds,
+    walk_claim,
+    walk_success,
+)
+
+__all__ = [
+    "HELD_OUT",
+    "PUBLISHED_LAW",
+    "QUICK",
+    "AblationTable",
+    "CertifiedVariant",
+    "Claim",
+    "DelayMap",
+    "Figure4",
+    "Findings",
+    "NoisySensors",
+    "PlantComparison",
+    "RandomPlantTable",
+    "SeaPlant",
+    "SensorNoise",
+    "StudySize",
+    "TorqueTrace",
+    "UnsafeExample",
+    "Verdict",
+    "Walk",
+    "WalkCase",
+    "WalkRow",
+    "ablation_cases",
+    "ablation_table",
+    "at_delay_scale",
+    "beyond_cases",
+    "compare_plant",
+    "delay_map",
+    "delayed_margin",
+    "figure_4",
+    "figure_4_claims",
+    "figure_5",
+    "figure_5_claims",
+    "gain_cases",
+    "gait_cases",
+    "measured_lag",
+    "planned_walk",
+    "random_plant_table",
+    "random_sea_plant",
+    "reproduce",
+    "robustness_cases",
+    "rough_grounds",
+    "simulate_walk",
+    "simulated_motion",
+    "study",
+    "unsafe_examples",
+    "walk_claim",
+    "walk_success",
+    "walking_of",
+    "write_paper_page",
+    "wrong_robot",
+    "wrong_springs",
+]

@@ -1,0 +1,188 @@
+"""The parts of the paper's page that compare the walk with bounds, Fig. 5 and future work."""
+
+import numpy as np
+
+from humanoids2016._figure5 import TorqueTrace
+from humanoids2016._findings import Findings
+from humanoids2016._page import Cell, Figure, Section, Table, Text
+from humanoids2016._plots import plot_delay_map, plot_figure_4, plot_torques
+from humanoids2016._walk_page import rows_table
+
+
+def limits_section(found: Findings) -> Section:
+    """Compare bounds over the planned and the simulated walk, and both with what walks.
+
+    Args:
+        found: what the study computed.
+    """
+    planned, simulated, delays = found.figure, found.simulated, found.delays
+    unit = int(np.argmin(np.abs(planned.alpha - 1.0)))
+
+    def ms(value: float) -> Cell:
+        return Cell(text=f"{value * 1e3:.1f}", css="number")
+
+    bounds = [
+        [
+            f"(29), one leg, D_θ[0] = {damping:g} Nms/rad",
+            ms(planned.delay_s[k, unit]),
+            ms(simulated.delay_s[k, unit]),
+        ]
+        for k, damping in enumerate(planned.abduction_damping)
+    ]
+    for before, after in zip(planned.certified, simulated.certified, strict=True):
+        name = f"certified, {before.signal}, {before.form.value}, gravity {before.gravity}"
+        bounds.append(
+            [name.replace("_", " ")]
+            + [ms(v.delay_s.min()) if not v.reason else Cell(text="refused", css="number")
+               for v in (before, after)]
+        )  # fmt: skip
+    return Section(
+        anchor="limits",
+        title="Bounds and what walks",
+        blocks=[
+            Table(
+                columns=["Smallest bound at α = 1 (ms)", "planned walk", "simulated walk"],
+                rows=bounds,
+                caption="In the simulated walk the foot that carries more load counts as stance.",
+            ),
+            Figure(
+                svg=plot_figure_4(simulated),
+                caption="Fig. 4 over the walk as simulated: largest delay (ms) against α. Dashed: "
+                "the certified criterion with the symmetric stiffness and q̄(θ) fed back.",
+            ),
+            Text(
+                text=(
+                    "The criterion bounds the delay of a position loop's passivity; it does not "
+                    "predict a fall. The walk depends on how well it works ahead of the delay and "
+                    "on where the next foot lands. The delays are scaled until it falls, over "
+                    f"{delays.terrains} rough grounds that nothing was chosen on; the controller "
+                    "knows the mean of its command's way."
+                )
+            ),
+            Figure(
+                svg=plot_delay_map(delays),
+                caption="What is walked over 7 steps, against spring stiffness and largest total "
+                "delay d_1 = T_H + T_L/2. Lines: bounds for the position loop with the paper's "
+                "gains over the planned walk. Its exact margin is 0, a biped on one point foot "
+                "being a pendulum; drawn is where the delay makes one more pair of roots unstable.",
+            ),
+            Table(
+                columns=[
+                    "K (Nm/rad)", "a gait up to (ms)", "walked up to (ms)",
+                    "certified, motor (ms)", "certified, q̄(θ) (ms)", "next crossing (ms)",
+                ],
+                rows=[
+                    [Cell(text=f"{row[0]:g}", css="number"), *(ms(value) for value in row[1:])]
+                    for row in zip(
+                        delays.stiffness, delays.longest_gait, delays.longest_walked,
+                        delays.certified_motor, delays.certified_static, delays.first_crossing,
+                        strict=True,
+                    )
+                ],
+                caption="Largest d_1 up to which every ground was walked.",
+            ),
+            Text(text="Over spring stiffness, α and β at the paper's delays:"),
+            rows_table(found.gains),
+        ],
+    )  # fmt: skip
+
+
+def figure_5_section(found: Findings) -> Section:
+    """Show Fig. 5.
+
+    Args:
+        found: what the study computed.
+    """
+    traces, joints = found.traces, found.system.robot.joints
+    shown = [t for t in traces if t.damping_scale == 1.0 and t.stiffness == traces[0].stiffness]
+    rows = [
+        [
+            Cell(text=f"{t.stiffness:g}", css="number"),
+            Cell(text=f"{t.damping_scale:g}", css="number"),
+            Cell(text=f"{t.beta:g}", css="number"),
+            *(_if_walked(t, f"{value:.1f}") for value in t.deviation[:3]),
+            _if_walked(t, f"{t.raw_deviation.mean():.0f}"),
+            _if_walked(t, f"{t.command_lag * 1e3:.1f}"),
+            _if_walked(t, f"{t.torque_lag * 1e3:.1f}"),
+            t.walk.gait.cause,
+        ]
+        for t in traces
+    ]
+    channel = traces[0].channel
+    return Section(
+        anchor="figure5",
+        title="Fig. 5: command and spring torque",
+        blocks=[
+            Text(
+                text=(
+                    "Γ_osc is the torque that the tasks ask for, as late as its command acts at "
+                    "the motors; Γ_sea is the spring torque. The command τ_osc itself is at α = 1 "
+                    "mostly D_θθ̇_d, which the embedded damping takes off again and which hides β."
+                )
+            ),
+            Figure(
+                svg=plot_torques(shown, range(3)),
+                caption=f"One leg's joints at K = {shown[0].stiffness:g} Nm/rad, α = 1: Γ_osc "
+                "(thin) and Γ_sea (thick) for the smallest and largest β.",
+            ),
+            Table(
+                columns=[
+                    "K (Nm/rad)", "α", "β", *(f"{name} (Nm)" for name in joints[:3]),
+                    "τ_osc − Γ_sea (Nm)", "command late (ms)", "Γ_sea late (ms)", "walk",
+                ],
+                rows=rows,
+                caption="RMS of Γ_osc − Γ_sea for one leg's joints; mean RMS over all joints with "
+                "the feedforward left in; measured lags of the acting command and of Γ_sea behind "
+                f"what was sent, beside a mean (T_H + T_L)/2 of {channel * 1e3:.1f} ms.",
+            ),
+        ],
+    )  # fmt: skip
+
+
+def _if_walked(trace: TorqueTrace, text: str) -> Cell:
+    return Cell(text=text if trace.walk.gait.walked else "–", css="number")
+
+
+def beyond_section(found: Findings) -> Section:
+    """Show walks beyond the paper, and what became of its future work.
+
+    Args:
+        found: what the study computed.
+    """
+    certificate = found.certificate
+
+    answer, feedback = certificate.answer, certificate.question.feedback.replace("_", " ")
+
+    def ms(value: float | None) -> str:
+        return "nothing" if value is None else f"{value * 1e3:.2f} ms"
+
+    return Section(
+        anchor="beyond",
+        title="Beyond the paper",
+        blocks=[
+            rows_table(found.beyond),
+            Table(
+                columns=["Future work", "Here"],
+                rows=[
+                    [
+                        "(i) time-varying J*, Λ and stiffness",
+                        "One constant multiplier for the whole planned walk, which V_4 needs, "
+                        f"allows {ms(answer.common_multiplier_delay_s)}; matrices that move "
+                        "as they like inside polytopes around it, window by window, "
+                        f"{ms(answer.time_varying_delay_s)}; the pointwise bound is "
+                        f"{ms(answer.max_delay_s)} "
+                        f"({feedback} feedback).",
+                    ],
+                    [
+                        "(ii) to (iv)",
+                        "The paper's wording of these was not at hand when this page was written, "
+                        "so none is claimed as done. What goes beyond the paper here: criteria "
+                        "for each signal that may be fed back, the exact local margin, delays "
+                        "with jitter and loss, contacts with impact and friction, wrong models "
+                        "and noisy sensors, and a closed-loop walk.",
+                    ],
+                ],
+                stack=True,
+            ),
+        ],
+    )

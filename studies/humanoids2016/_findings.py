@@ -1,0 +1,107 @@
+"""What the study computes, and how much of it."""
+
+from dataclasses import dataclass
+
+from humanoids2016._ablation import AblationTable
+from humanoids2016._beyond import SCALES, STIFFNESSES, DelayMap
+from humanoids2016._claims import Claim
+from humanoids2016._figure4 import Figure4
+from humanoids2016._figure5 import BETAS, TorqueTrace
+from humanoids2016._random_table import RandomPlantTable
+from humanoids2016._unsafe import UnsafeExample
+from humanoids2016._walk import Walk
+from humanoids2016._walk_table import WalkRow
+from sealag.design import System
+from sealag.passivity import Certificate
+from sealag.robot import Motion
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudySize:
+    """How much the study computes; the defaults are the page's.
+
+    Attributes:
+        rate: instants of the planned walk per second.
+        plants: random plants on which both criteria meet the exact margin.
+        draws: random three-joint plants with the printed stiffness ΛK_x.
+        grounds: rough grounds of the success tables.
+        few_grounds: rough grounds of the tables with many cases.
+        held_out_steps: steps on grounds that nothing was chosen on.
+        cases: how many cases of each table at most, the published law beside; None for all.
+        stiffnesses: spring stiffnesses of the delay map, Nm/rad.
+        scales: factors on the delays in the delay map, increasing.
+        betas: values of β = B_s / B in Fig. 5.
+        jobs: number of processes.
+    """
+
+    rate: float = 1000.0
+    plants: int = 1000
+    draws: int = 200
+    grounds: int = 20
+    few_grounds: int = 4
+    held_out_steps: int = 20
+    cases: int | None = None
+    stiffnesses: tuple[float, ...] = STIFFNESSES
+    scales: tuple[float, ...] = SCALES
+    betas: tuple[float, ...] = BETAS
+    jobs: int = 2
+
+
+QUICK = StudySize(
+    rate=20.0,
+    plants=30,
+    draws=10,
+    grounds=1,
+    few_grounds=1,
+    held_out_steps=2,
+    cases=2,
+    stiffnesses=(350.0,),
+    scales=(1.0, 6.0),
+    betas=(0.5,),
+)
+"""A page with few cases, in less than a minute."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Findings:
+    """All that the page shows.
+
+    Attributes:
+        system: the project: robot, gains, delays and walk.
+        motion: the planned walk.
+        figure: Fig. 4 over the planned walk.
+        simulated: Fig. 4 over the simulated walk.
+        unsafe: plants on which the published criterion is unsafe.
+        table: both criteria on random plants.
+        walk: the project's walk, simulated.
+        robust: success with sensor and model errors.
+        held_out: the same on grounds that nothing was chosen on.
+        ablations: success with each means left out.
+        everywhere: the same over spring stiffness, α, β and delays.
+        gait: what makes the walk a gait.
+        gains: success over spring stiffness, α and β.
+        delays: how much delay is walked, beside the bounds.
+        traces: the walks of Fig. 5.
+        beyond: stairs, pushes and rougher ground.
+        certificate: over the planned walk, with the bound for matrices that vary in time.
+        claims: statements of the paper, checked.
+    """
+
+    system: System
+    motion: Motion
+    figure: Figure4
+    simulated: Figure4
+    unsafe: tuple[UnsafeExample, ...]
+    table: RandomPlantTable
+    walk: Walk
+    robust: tuple[WalkRow, ...]
+    held_out: tuple[WalkRow, ...]
+    ablations: tuple[WalkRow, ...]
+    everywhere: AblationTable
+    gait: tuple[WalkRow, ...]
+    gains: tuple[WalkRow, ...]
+    delays: DelayMap
+    traces: tuple[TorqueTrace, ...]
+    beyond: tuple[WalkRow, ...]
+    certificate: Certificate
+    claims: tuple[Claim, ...]

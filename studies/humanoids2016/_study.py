@@ -1,0 +1,185 @@
+"""The study from start to end: compute, then write the page."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from humanoids2016._ablation import PUBLISHED_LAW, ablation_cases, ablation_table, gait_cases
+from humanoids2016._beyond import HELD_OUT, beyond_cases, delay_map
+from humanoids2016._figure4 import LEG, figure_4, figure_4_claims, simulated_motion
+from humanoids2016._figure5 import figure_5, figure_5_claims
+from humanoids2016._findings import QUICK, Findings, StudySize
+from humanoids2016._paper_page import write_paper_page
+from humanoids2016._random_table import random_plant_table
+from humanoids2016._unsafe import unsafe_examples
+from humanoids2016._walk import WalkCase, simulate_walk, walking_of
+from humanoids2016._walk_table import (
+    WalkRow,
+    gain_cases,
+    robustness_cases,
+    rough_grounds,
+    walk_claim,
+    walk_success,
+)
+from sealag import __version__ as VERSION
+from sealag.design import System, certify, load, save_motion
+from sealag.errors import InputError
+from sealag.report import write_run
+from sealag.robot import Motion
+from sealag.walking import plan_walk, walk_motion
+
+
+def reproduce(
+    out: Path,
+    *,
+    progress: Callable[[str], None],
+    project: str = "bundled:hume",
+    quick: bool = False,
+) -> dict[str, Any]:
+    """Compute everything and write the page, its CSVs, the planned walk and the recording.
+
+    Args:
+        out: folder for all files.
+        progress: called with a sentence before each part.
+        project: a project file with Hume's joints and a [walking] section.
+        quick: whether a few cases of each table are enough.
+
+    Returns:
+        The JSON answer of `sealag paper`.
+
+    Raises:
+        InputError: the project has no [walking] section, or its robot is not Hume.
+        FileError: a file cannot be written.
+    """
+    found = study(project, QUICK if quick else StudySize(), progress=progress)
+    system, walk = found.system, found.walk
+    progress("[7/7] writing the page")
+    save_motion(found.motion, system.robot, out / "walk.csv")
+    write_run(walk.run, system.robot, out / "walk.mcap", project=system.text, version=VERSION)
+    page = write_paper_page(out, found, version=VERSION)
+    return {
+        "page": str(page),
+        "instants": len(found.motion),
+        "claims": {claim.key: claim.verdict.value for claim in found.claims},
+        "unsafe_published": found.table.published_longer,
+        "unsafe_certified": found.table.certified_longer,
+        "steps_walked": walk.gait.steps,
+        "walked": {row.name: f"{row.walked}/{row.terrains}" for row in found.robust},
+        "gaits": {row.name: f"{row.gaits}/{row.terrains}" for row in found.robust},
+        "walked_on_new_ground": {
+            row.name: f"{row.walked}/{row.terrains}, {row.steps} steps" for row in found.held_out
+        },
+    }
+
+
+def planned_walk(system: System, *, rate: float = 1000.0) -> Motion:
+    """Return the planned walk: feet, ground, steps and CoM height of the project's [walking].
+
+    Apex speeds and step lengths are those of `plan_walk`, as the paper's plan has them.
+
+    Args:
+        system: the project.
+        rate: instants per second.
+
+    Raises:
+        InputError: the project has no [walking] section.
+        RobotError: a foothold is out of reach.
+    """
+    walking = walking_of(system)
+    plan = plan_walk(walking.ground, steps=walking.steps, com_height=walking.gait.com_height)
+    return walk_motion(system.robot, plan, rate=rate, feet=walking.feet)
+
+
+def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> Findings:
+    """Compute all that the page shows.
+
+    Args:
+        project: a project file with Hume's joints and a [walking] section.
+        size: how much.
+        progress: called with a sentence before each part.
+
+    Raises:
+        InputError: the project has no [walking] section, or its robot is not Hume.
+    """
+    system = load(project)
+    walking = walking_of(system)
+    _require_hume(system)
+    progress(f"[1/7] planning {walking.steps} steps and their whole-body motion")
+    motion = planned_walk(system, rate=size.rate)
+    progress(f"[2/7] Fig. 4 over {len(motion)} instants")
+    figure = figure_4(system, motion)
+    progress("[3/7] published and certified criterion against the exact delay margin")
+    unsafe, table = unsafe_examples(draws=size.draws), random_plant_table(size.plants)
+    progress(f"[4/7] walking {walking.steps} steps in closed loop under delay")
+    walk = simulate_walk(system)
+
+    def tabulate(cases: Mapping[str, WalkCase], count: int, first: int = 0) -> tuple[WalkRow, ...]:
+        grounds = rough_grounds(count, first=first)
+        return walk_success(_some(cases, size), grounds, project=project, jobs=size.jobs)
+
+    progress("[5/7] walking over random terrains, with and without noise and model errors")
+    robust = tabulate(robustness_cases(walking), size.grounds)
+    longer = replace(walking, steps=size.held_out_steps)
+    held_out = tabulate(robustness_cases(longer), size.grounds, HELD_OUT)
+    progress("[6/7] leaving out each means, varying gains and delays, stairs, pushes; Fig. 5")
+    ablations = tabulate(ablation_cases(walking), size.few_grounds)
+    traces = figure_5(betas=size.betas, project=project, jobs=size.jobs)
+    published = next(row for row in ablations if row.name == PUBLISHED_LAW)
+    few = (size.few_grounds + 1) // 2
+    return Findings(
+        system=system,
+        motion=motion,
+        figure=figure,
+        simulated=figure_4(system, simulated_motion(walk.run)),
+        unsafe=unsafe,
+        table=table,
+        walk=walk,
+        robust=robust,
+        held_out=held_out,
+        ablations=ablations,
+        everywhere=ablation_table(
+            rough_grounds(few), project=project, most=size.cases, jobs=size.jobs
+        ),
+        gait=tabulate(gait_cases(walking), size.few_grounds),
+        gains=tabulate(gain_cases(walking, system.delays), size.few_grounds),
+        delays=delay_map(
+            motion,
+            project=project,
+            stiffnesses=size.stiffnesses,
+            scales=size.scales,
+            terrains=few,
+            jobs=size.jobs,
+        ),
+        traces=traces,
+        beyond=walk_success(
+            _some(beyond_cases(walking), size), None, project=project, jobs=size.jobs
+        ),
+        certificate=certify(system, motion, time_varying=True),
+        claims=(
+            *figure_4_claims(figure, table),
+            *figure_5_claims(traces),
+            walk_claim(robust, published),
+        ),
+    )
+
+
+def _require_hume(system: System) -> None:
+    """Refuse a robot without Hume's legs, of which figures and playback are."""
+    names = [f"{side}_{part}" for side in ("left", "right") for part in LEG]
+    missing = [name for name in names if name not in system.robot.joints]
+    if missing:
+        raise InputError(
+            f"The study is about Hume; {system.name} has no joint {missing[0]}. Start from "
+            "bundled:hume."
+        )
+
+
+def _some(cases: Mapping[str, WalkCase], size: StudySize) -> dict[str, WalkCase]:
+    """The first cases of a table, and the published law, on which a claim rests."""
+    most = len(cases) if size.cases is None else size.cases
+    return {
+        name: case
+        for k, (name, case) in enumerate(cases.items())
+        if k < most or name.startswith(PUBLISHED_LAW)
+    }
