@@ -68,7 +68,7 @@ def test_a_bad_solver_of_polytopes_is_not_certified(walk):
     good = sealag.certify(*walk)
     for answers in range(1, 20):
         certificate = sealag.certify(*walk, time_varying=True, solver=Forgetful(answers))
-        if certificate.answer.common_multiplier_delay_s == good.common_multiplier_delay_s:
+        if certificate.answer.common_multiplier_delay_s == good.answer.common_multiplier_delay_s:
             break
     assert certificate.answer.status == "not_certified"
     assert "matrices that move" in certificate.answer.reasons[0]

@@ -201,4 +201,4 @@ def test_a_biped_on_point_feet_is_passive_and_never_stable():
 def test_delayed_gravity_on_several_feet_is_refused(name):
     *_, certified, _ = bounds_of(name, MOTOR, DELAYED)
     assert (certified.delay == 0.0).all()
-    assert "not symmetric" in certified.reasons[0]
+    assert "not symmetric" in certified.refusals[0]

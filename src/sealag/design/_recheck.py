@@ -1,4 +1,4 @@
-"""Checking a certificate against the design that it is said to be of."""
+"""Checking a certificate against the design that it names."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -23,8 +23,9 @@ from sealag.robot import Motion
 from sealag.typing import Array
 
 AGREEMENT = 1e-6
-"""Relative difference up to which recomputed numbers agree: another machine rounds in another way,
-and bounds are brackets of that width."""
+"""Relative difference up to which recomputed numbers agree: machines round differently, and bounds
+are brackets of that width. Ten times less accuses other machines; ten times more hides a change in
+the sixth digit."""
 
 _PROBES = np.array([0.3 + 1.0j, 1.0 + 1.0j, 3.0 + 10.0j])
 """Places right of the axis, as multiples of the crossing's frequency, where loops are compared."""
@@ -34,8 +35,8 @@ _NOT_UNIQUE = frozenset(
      "proofs", "worst_motion", "versions", "hashes", "common_multiplier_delay_s",
      "time_varying_delay_s", "conservatism"}
 )  # fmt: skip
-"""Fields that more than one value can be right for: coordinates and multipliers may be chosen, and
-solvers end where they end. `verify` checks them from the file; what follows checks the rest."""
+"""Fields with more than one right value: coordinates and multipliers are a choice, and solvers stop
+at different points. `verify` checks them from the file; the checks below compare the rest."""
 
 
 def verify_design(

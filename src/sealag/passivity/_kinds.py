@@ -23,9 +23,9 @@ class Criterion(StrEnum):
 class Basis(StrEnum):
     """What an instant's local margin rests on.
 
-    exact: the margin itself. bound: the passive bound of that instant, which is not above its
-    margin, where the loop without delay was decided to be stable. searched: stable likewise, and
-    no root crosses at a delay up to this one. open: not decided.
+    exact: the margin itself. bound: the passive bound of that instant, which does not exceed its
+    margin because the loop without delay is stable. searched: stable without delay, and no root
+    crosses up to this delay. open: not decided.
     """
 
     EXACT = "exact"

@@ -21,7 +21,7 @@ from sealag.errors import CertificateError
 from sealag.typing import Array
 
 UNBOUNDED = "unbounded"
-"""What a file says where no time is too long."""
+"""How a file writes a time that no delay reaches."""
 
 SECTION = "section"
 """Marks a field whose own fields stand in the file beside it: `Annotated[Answer, SECTION]`."""

@@ -24,12 +24,15 @@ if TYPE_CHECKING:
     from sealag.passivity._certificate import Certificate, Question
 
 COUPLED = 1e-6
-"""Share of the delayed stiffness from which an answer to passive motions counts."""
+"""Share of A_1 from which an entry that the motor angles do not multiply counts. Ten times less
+takes differences of the law for coupling; ten times more trusts a bound of a coupled law."""
 
 _SHARES = (0.25, 0.5, 0.75, 0.999)
 """Shares of the first crossing at which roots are counted where the sweep does not apply."""
 
 _STRUCTURE = 1e-8
+"""Relative size of A v that counts as 0 for a symmetry v. Ten times less accuses contacts that are
+followed by differences; ten times more divides out slow modes of the softest springs."""
 
 _DIFFERENCES = 1e-6
 """Share of F that A_1 may differ by: it holds central differences of the law that runs, good to
@@ -90,7 +93,7 @@ class LocalLoop:
         return question.feedback != "joint" and aside > COUPLED * _size(self.A_1)
 
     def checks(self, c: "Certificate") -> Iterator[Check]:
-        """Check the loop's structure, and margin, first crossing and unstable modes that it has.
+        """Check the loop's structure, its margin, first crossing and unstable modes.
 
         Args:
             c: the certificate that this loop is part of.
@@ -246,7 +249,7 @@ class LocalLoop:
 
 
 def without_loop(c: "Certificate") -> Check:
-    """Without a loop only this may be said of it: that there is none, where nothing rests.
+    """Check that nothing is claimed of a loop that is not in the file.
 
     Args:
         c: the certificate.

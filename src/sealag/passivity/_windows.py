@@ -1,7 +1,7 @@
 """Time-varying J* and stiffness: one multiplier for all that polytopes around a motion contain."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
@@ -54,22 +54,23 @@ class Windows:
         """
         problem = problem.motion()
         parts = _boxed(problem, self._edges(len(problem.J)), self)
+        points = np.concatenate(parts.corners)
+        corners = Problem(J=_J(points), M=_M(points), blocks=problem.blocks)
         with np.errstate(divide="ignore"):
-            stiffness = 1.0 / np.linalg.norm(parts.corners.scaled_stiffness(), axis=(1, 2))
-        found = search(parts.corners, stiffness, tolerance=_TOLERANCE, solver=solver)
-        sizes = _Sizes(delay=0.0, corner=np.zeros(parts.count), radius=np.zeros(parts.count))
-        if found.factor is not None:
-            sizes = _largest(parts, found.factor, sizes)
-        proven = sizes.delay > 0.0 and found.factor is not None
+            stiffness = 1.0 / np.linalg.norm(corners.scaled_stiffness(), axis=(1, 2))
+        found = search(corners, stiffness, tolerance=_TOLERANCE, solver=solver)
         open_ = found.upper > found.delay * (1.0 + _TOLERANCE) and np.isfinite(found.delay)
         reason = f"{solver.name} left the bracket open: {found.status}" if open_ else ""
-        if not proven and not open_:
-            reason = "nothing was proven: the balls are too large; try shorter windows"
+        upper = lessened(found.upper, -rounding(problem))
+        sizes = None if found.factor is None else _largest(parts, corners, found.factor)
+        if found.factor is None or sizes is None or sizes.delay == 0.0:
+            reason = reason or "nothing was proven: the balls are too large; try shorter windows"
+            return Bound(problem=problem, delay=np.zeros(()), upper=upper, reason=reason)
         return Bound(
             problem=problem,
-            delay=lessened(sizes.delay, rounding(problem)) if proven else np.zeros(()),
-            upper=lessened(found.upper, -rounding(problem)),
-            multiplier=found.factor.W if found.factor is not None and proven else None,
+            delay=lessened(sizes.delay, rounding(problem)),
+            upper=upper,
+            multiplier=found.factor.W,
             binding=found.binding,
             reason=reason,
             windows=parts.polytopes(sizes),
@@ -101,20 +102,18 @@ class _Sizes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Boxes:
-    """Boxes of all windows with their corners, and what sticks out of them; windows by index."""
+    """Boxes of all windows with their corners, and what sticks out of them.
+
+    Points are [Jᵀ, M], (n, 2m). Each list has one array (…, n, 2m) a window: the box's centre and
+    half edges, its corners, and of each instant what the box leaves and what the ball adds for the
+    motion between instants.
+    """
 
     edges: list[tuple[int, int]]
-    boxes: Problem
-    box_window: Array
-    corners: Problem
-    corner_window: Array
-    rest: Problem
-    rest_window: Array
-    bend: Problem
-
-    @property
-    def count(self) -> int:
-        return len(self.edges)
+    boxes: list[Array]
+    corners: list[Array]
+    rest: list[Array]
+    bend: list[Array]
 
     def polytopes(self, sizes: _Sizes) -> tuple[Polytope, ...]:
         """Each window's box with the ball around it."""
@@ -122,26 +121,44 @@ class _Boxes:
             Polytope(
                 first=first,
                 last=last,
-                J=self.boxes.J[self.box_window == k],
-                M=self.boxes.M[self.box_window == k],
-                corner=float(sizes.corner[k]),
-                radius=float(sizes.radius[k]),
+                J=_J(box),
+                M=_M(box),
+                corner=float(corner),
+                radius=float(radius),
             )
-            for k, (first, last) in enumerate(self.edges)
+            for (first, last), box, corner, radius in zip(
+                self.edges, self.boxes, sizes.corner, sizes.radius, strict=True
+            )
         )
 
+    def sizes(self, factor: Factor, delay: float) -> _Sizes:
+        """Largest corner and radius of each window for a multiplier and a delay."""
+        corner, rest, bend = (
+            _largest_norms(part, factor, delay) for part in (self.corners, self.rest, self.bend)
+        )
+        return _Sizes(delay=delay, corner=corner, radius=rest + bend)
 
-def _largest(parts: _Boxes, factor: Factor, nothing: _Sizes) -> _Sizes:
+
+def _J(points: Array) -> Array:
+    return transposed(points[..., : points.shape[-1] // 2])
+
+
+def _M(points: Array) -> Array:
+    return points[..., points.shape[-1] // 2 :]
+
+
+def _largest(parts: _Boxes, corners: Problem, factor: Factor) -> _Sizes:
     """Bisect for the largest d with corner + radius ≤ √2 in every window."""
-    high = float(estimated_delays(parts.corners, factor).min())
+    high = float(estimated_delays(corners, factor).min())
     if np.isinf(high):
-        if not (parts.rest.M.any() or parts.bend.M.any()):
-            found = _sizes(parts, factor, 0.0)
-            return _Sizes(delay=np.inf, corner=found.corner, radius=found.radius)
+        loose = any(_M(part).any() for part in (*parts.rest, *parts.bend))
+        if not loose:
+            return replace(parts.sizes(factor, 0.0), delay=np.inf)
         high = _LONGEST
-    answer = nothing
+    nothing = np.zeros(len(parts.edges))
+    answer = _Sizes(delay=0.0, corner=nothing, radius=nothing)
     for step in range(50):
-        tried = _sizes(parts, factor, high if step == 0 else 0.5 * (answer.delay + high))
+        tried = parts.sizes(factor, high if step == 0 else 0.5 * (answer.delay + high))
         if (tried.corner + tried.radius <= np.sqrt(2.0) * (1.0 - 4.0 * EPS)).all():
             answer = tried
         else:
@@ -151,76 +168,40 @@ def _largest(parts: _Boxes, factor: Factor, nothing: _Sizes) -> _Sizes:
     return answer
 
 
-def _sizes(parts: _Boxes, factor: Factor, d: float) -> _Sizes:
-    corner, rest, bend = np.zeros((3, parts.count))
-    np.maximum.at(corner, parts.corner_window, _norms(parts.corners, factor, d))
-    np.maximum.at(rest, parts.rest_window, _norms(parts.rest, factor, d))
-    np.maximum.at(bend, parts.rest_window, _norms(parts.bend, factor, d))
-    return _Sizes(delay=d, corner=corner, radius=rest + bend)
-
-
-def _norms(problem: Problem, factor: Factor, d: float) -> Array:
-    """‖[JᵀC, d M C^-ᵀ]‖₂ from above, rounding included, (N,)."""
-    _, m, n = problem.J.shape
-    G, H = transposed(problem.J) @ factor.C, d * (problem.M @ factor.C_inverse)
-    size = norm(problem.J) * norm(factor.C) + d * norm(problem.M) * norm(factor.C_inverse)
-    exact = np.linalg.norm(np.concatenate([G, H], axis=2), ord=2, axis=(1, 2))
-    return exact + 32.0 * (m + n) * EPS * (size + exact)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Points:
-    """(J, M) of instants as rows of numbers of like size."""
-
-    problem: Problem
-    weight_J: float
-    weight_M: float
-
-    def rows(self) -> Array:
-        flat = [part.reshape(len(part), -1) for part in (self.problem.J, self.problem.M)]
-        return np.concatenate([self.weight_J * flat[0], self.weight_M * flat[1]], axis=1)
-
-    def back(self, rows: Sequence[Array]) -> Problem:
-        _, m, n = self.problem.J.shape
-        stacked = np.array(rows)
-        J, M = stacked[:, : m * n] / self.weight_J, stacked[:, m * n :] / self.weight_M
-        return Problem(J=J.reshape(-1, m, n), M=M.reshape(-1, n, m), blocks=self.problem.blocks)
+def _largest_norms(windows: list[Array], factor: Factor, d: float) -> Array:
+    """Largest ‖[JᵀC, d M C^-ᵀ]‖₂ of each window from above, rounding included, (K,)."""
+    points = np.concatenate(windows)
+    J, M = _J(points), _M(points)
+    turned = np.concatenate([transposed(J) @ factor.C, d * (M @ factor.C_inverse)], axis=2)
+    exact = np.linalg.norm(turned, ord=2, axis=(1, 2))
+    size = norm(J) * norm(factor.C) + d * norm(M) * norm(factor.C_inverse)
+    above = exact + 32.0 * sum(J.shape[1:]) * EPS * (size + exact)
+    return np.maximum.reduceat(above, np.cumsum([0, *map(len, windows[:-1])]))
 
 
 def _boxed(problem: Problem, edges: list[tuple[int, int]], choice: Windows) -> _Boxes:
     """Box every window along its principal directions."""
-    weights = (1.0 / max(float(np.abs(part).max()), 1e-300) for part in (problem.J, problem.M))
-    points = _Points(problem=problem, weight_J=next(weights), weight_M=next(weights))
-    rows = points.rows()
-    bend = np.zeros_like(rows)
+    points = np.concatenate([transposed(problem.J), problem.M], axis=2)
+    bend = np.zeros_like(points)
     if choice.between:
-        bend[1:-1] = (rows[2:] - 2.0 * rows[1:-1] + rows[:-2]) / 8.0
+        bend[1:-1] = (points[2:] - 2.0 * points[1:-1] + points[:-2]) / 8.0
         bend[list(choice.breaks)] = bend[[at - 1 for at in choice.breaks]] = 0.0
-    boxes, corners, rests, bends = [], [], [], []
-    box_window, corner_window, rest_window = [], [], []
-    for k, (first, last) in enumerate(edges):
-        here = rows[first : last + 1]
-        middle = here.mean(axis=0)
-        axes = np.linalg.svd(here - middle, full_matrices=False)[2][: choice.directions]
-        along = (here - middle) @ axes.T
+    # J and M have units of their own: directions are those of numbers of like size.
+    largest = [max(float(np.abs(part).max()), 1e-300) for part in (problem.J, problem.M)]
+    weight = np.repeat(1.0 / np.array(largest), problem.J.shape[1])
+    boxes, corners, rest = [], [], []
+    for first, last in edges:
+        here = points[first : last + 1] * weight
+        flat = here.reshape(len(here), -1)
+        middle = flat.mean(axis=0)
+        axes = np.linalg.svd(flat - middle, full_matrices=False)[2][: choice.directions]
+        along = (flat - middle) @ axes.T
         low, high = along.min(axis=0), along.max(axis=0)
         centre, half = middle + (low + high) / 2.0 @ axes, ((high - low) / 2.0)[:, None] * axes
-        signs = product((-1.0, 1.0), repeat=len(half))
-        around = [centre + np.array(sign) @ half for sign in signs]
-        boxes += [centre, *half]
-        corners += around
-        rests.extend(here - middle - along @ axes)
-        bends.extend(bend[first : last + 1])
-        box_window += [k] * (1 + len(half))
-        corner_window += [k] * len(around)
-        rest_window += [k] * len(here)
-    return _Boxes(
-        edges=edges,
-        boxes=points.back(boxes),
-        box_window=np.array(box_window),
-        corners=points.back(corners),
-        corner_window=np.array(corner_window),
-        rest=points.back(rests),
-        rest_window=np.array(rest_window),
-        bend=points.back(bends),
-    )
+        signs = list(product((-1.0, 1.0), repeat=len(half)))
+        shape = (-1, *here.shape[1:])
+        boxes.append(np.vstack([centre, half]).reshape(shape) / weight)
+        corners.append((centre + np.array(signs) @ half).reshape(shape) / weight)
+        rest.append((flat - middle - along @ axes).reshape(shape) / weight)
+    bends = [bend[first : last + 1] for first, last in edges]
+    return _Boxes(edges=edges, boxes=boxes, corners=corners, rest=rest, bend=bends)
