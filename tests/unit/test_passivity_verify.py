@@ -11,7 +11,7 @@ import sealag
 import sealag.passivity
 from helpers.certificates import failures, made, plain, resealed, without_loop
 from sealag.errors import CertificateError, InputError
-from sealag.passivity import Criterion, verify, write_certificate
+from sealag.passivity import Criterion, read_certificate, verify, write_certificate
 
 SEED = 20261124
 CHECKERS = (
@@ -225,6 +225,15 @@ def test_unreadable_certificates_are_named(tmp_path):
     ):
         with pytest.raises(CertificateError, match="is not a certificate: `"):
             verify({**data, **broken})
+
+
+@pytest.mark.parametrize("design", ["baxter", "moving", "crawl", "one foot", "flying"])
+def test_what_is_read_is_what_was_written(design):
+    data = made(design)
+    certificate = read_certificate(data)
+    assert certificate.to_json_dict() == data
+    assert certificate.summary().keys() < data.keys()
+    assert [check.name for check in certificate.checks() if not check.ok] == []
 
 
 def test_a_certificate_has_no_truth_value():

@@ -1,4 +1,9 @@
-"""Passivity criteria: how much delay a design tolerates, and the proof of it."""
+"""Passivity criteria: how much delay a design tolerates, and the proof of it.
+
+`solve` answers a `Problem` with a `Bound`, for a multiplier that each `Instant`, a whole `Motion` or
+all of some `Windows` share. A `Certificate` is question, answer and evidence; `verify` checks it
+from its own numbers, without the code that made it.
+"""
 
 from sealag.passivity._bound import Bound
 from sealag.passivity._certificate import (
