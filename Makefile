@@ -4,11 +4,13 @@ BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help setup paper test bench lint clean
+.PHONY: help setup paper test quick bench lint wheel wheel-check clean
 
 help:
 	@echo "make paper   compute the paper's figures and claims into out/paper/"
 	@echo "make test    lint, types, import boundaries and the whole test suite"
+	@echo "make quick   the same without the tests marked slow"
+	@echo "make wheel-check  build sdist and wheel, install and use the wheel in a fresh environment"
 	@echo "make bench   certificates and control ticks beside their peers, as ratios"
 	@echo "make setup   build .venv only (the other commands do this by themselves)"
 
@@ -39,10 +41,23 @@ lint: setup
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal
+
+quick: lint
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
+
+# The wheel is built from the sdist, so that both are known to be complete.
+wheel:
+	@rm -rf dist build/wheel
+	@$(PYTHON) -m venv build/wheel
+	@build/wheel/bin/python -m pip install --disable-pip-version-check -q build
+	build/wheel/bin/python -m build --outdir dist .
+
+wheel-check: wheel
+	PYTHON=$(PYTHON) .ci/wheel-check dist/*.whl
 
 bench: setup
 	$(BIN)/python -m bench
 
 clean:
-	rm -rf out .pytest_cache .ruff_cache .hypothesis
+	rm -rf out build dist .pytest_cache .ruff_cache .hypothesis

@@ -13,7 +13,7 @@ import numpy as np
 
 from bench.peers.timing import median_us
 from sealag.design import load
-from sealag.robot import example_robot_path
+from sealag.robot import resolve_urdf
 from sealag.whole_body import SIGNAL_NAMES, Controller, Measurement, signal_named
 
 ANYMAL = "anymal_b_simple_description/robots/anymal.urdf"
@@ -75,7 +75,9 @@ def _pink() -> Callable[[], object]:
     import pinocchio as pin
     from pink.tasks import ComTask, FrameTask, PostureTask
 
-    model = pin.buildModelFromUrdf(str(example_robot_path(ANYMAL)), pin.JointModelFreeFlyer())
+    model = pin.buildModelFromUrdf(
+        str(resolve_urdf(f"example-robot-data:{ANYMAL}")), pin.JointModelFreeFlyer()
+    )
     q = load("examples/anymal.toml").posture
     configuration = pink.Configuration(model, model.createData(), q)
     tasks = [FrameTask(f"{leg}_FOOT", 1.0, 0.0) for leg in ("LF", "RF", "LH", "RH")]
@@ -104,7 +106,7 @@ def _environment(peer: Peer) -> Path:
 
 def _without_meshes(folder: Path) -> Path:
     """Write the robot without visuals and collision shapes, which PlaCo would look for."""
-    tree = ElementTree.parse(example_robot_path(ANYMAL))
+    tree = ElementTree.parse(resolve_urdf(f"example-robot-data:{ANYMAL}"))
     for link in tree.getroot().iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)

@@ -6,7 +6,7 @@ Importing this package is cheap: names below are loaded when they are first used
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from sealag.version import __version__
 
 _HOME = {
     "System": "sealag.design",

@@ -1,7 +1,7 @@
-"""The error tree: one root, children that also are the builtin that a caller expects.
+"""The error tree: one root; children also inherit the builtin error that a caller expects.
 
-A message says what was wrong, where (file, key, joint, frame) and what would be right, in one
-sentence. "Not certified" is a result and never an exception.
+A message is one sentence: value, place (file, key, joint, frame), remedy. "Not certified" is a
+result, never an exception.
 """
 
 import difflib
@@ -50,11 +50,11 @@ class SolverError(SealagError, RuntimeError):
 
 
 class CertificateError(SealagError, ValueError):
-    """A certificate file is not readable as a certificate at all."""
+    """A file is not a certificate."""
 
 
 def near(name: str, known: Iterable[str], *, what: str) -> UnknownNameError:
-    """Make the error for a name that does not exist, with near matches.
+    """Return the error for an unknown name, with near matches.
 
     Args:
         name: what was asked for.
@@ -88,7 +88,7 @@ def word(kind: type[W], value: object, *, what: str) -> W:
 
 
 def either(names: Sequence[str]) -> str:
-    """Return names as a list in words: a, b or c.
+    """Join names as a, b or c.
 
     Args:
         names: the names.

@@ -1,4 +1,4 @@
-"""Reading files whole and within bounds; writing them whole, under a temporary name first."""
+"""Files: read with a size limit, written under a temporary name and then renamed."""
 
 import os
 import stat
@@ -20,13 +20,13 @@ def read_whole(path: Path, *, what: str, largest: int) -> bytes:
         largest: bytes.
 
     Raises:
-        FileError: it is missing, unreadable, larger, or no regular file.
+        FileError: it is missing, unreadable, too large, or not a regular file.
     """
     try:
         with open(path, "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                raise FileError(f"{what} {path} is no regular file; give the name of one.")
+                raise FileError(f"{what} {path} is not a regular file.")
             # Not `largest`: Python would make room for all of it before it reads.
             content = file.read(min(status.st_size or largest, largest) + 1)
     except OSError as error:
@@ -41,22 +41,24 @@ def read_whole(path: Path, *, what: str, largest: int) -> bytes:
 
 
 def check_output(path: Path, *inputs: Path) -> None:
-    """Refuse to write where something would be lost: over an input, a folder or a device.
+    """Refuse to overwrite an input, a folder or a device.
 
     Args:
         path: where a file is to be written; it need not exist.
         inputs: files that the command reads.
 
     Raises:
-        FileError: it is one of the inputs, or exists and is no regular file.
+        FileError: it is one of the inputs, or exists and is not a regular file.
     """
     if not path.exists():
         return
     if not path.is_file():
-        raise FileError(f"{path} cannot be written: it is no regular file; choose another --out.")
+        raise FileError(
+            f"{path} is not a regular file and is not overwritten; choose another --out."
+        )
     for other in inputs:
         if other.exists() and path.samefile(other):
-            raise FileError(f"{path} would be overwritten, but it is read; choose another --out.")
+            raise FileError(f"{path} is an input and is not overwritten; choose another --out.")
 
 
 def make_folder(path: Path) -> None:
@@ -76,7 +78,7 @@ def make_folder(path: Path) -> None:
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[BinaryIO]:
-    """Open a file for writing that appears under its name only once it is complete.
+    """Open a file for writing; it gets its name when it is complete.
 
     Args:
         path: where it goes; the folder is made if needed. What was there before stays until the

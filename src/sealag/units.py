@@ -1,4 +1,4 @@
-"""Units at the boundary: SI inside, milliseconds and degrees only where a person writes them."""
+"""Units at the boundary: SI inside, milliseconds only in project files and on the terminal."""
 
 import math
 from numbers import Real
@@ -6,7 +6,8 @@ from numbers import Real
 from sealag.errors import InputError
 
 LONGEST_DELAY_S = 5.0
-"""A longer network delay than this is taken for a mistaken unit, not for a robot."""
+"""A longer network delay is refused as a mistaken unit: 8 ms written as 8. Ten times larger lets
+that pass; ten times smaller refuses satellite links."""
 
 _UNITS = ((1e9, "ns"), (1e6, "us"), (1e3, "ms"))
 """Factor from s and name of the units below it."""
@@ -25,7 +26,7 @@ def seconds_from_ms(value_ms: float) -> float:
 
 
 def time_text(value_s: float | None) -> str:
-    """Write a time for a person: in ns, us, ms or s, with the digits that say something.
+    """Format a time in ns, us, ms or s with its significant digits.
 
     Args:
         value_s: s; inf for a time that no delay reaches, None for one that is not known.
@@ -77,9 +78,9 @@ def check_delay_s(value_s: float, name: str) -> float:
         InputError: it is not finite, negative, or longer than LONGEST_DELAY_S.
     """
     if not isinstance(value_s, Real) or isinstance(value_s, bool):
-        raise InputError(f"{name} is {value_s!r}; a number of seconds is right.")
+        raise InputError(f"{name} is {value_s!r}; it must be a number of seconds.")
     if not math.isfinite(value_s) or value_s < 0.0:
-        raise InputError(f"{name} is {value_s} s; a delay must be finite and not negative.")
+        raise InputError(f"{name} is {value_s} s; it must be finite and not negative.")
     if value_s > LONGEST_DELAY_S:
         raise InputError(
             f"{name} is {value_s:g} s, longer than {LONGEST_DELAY_S:g} s; "

@@ -52,19 +52,20 @@ def limits_section(found: Findings) -> Section:
             ),
             Text(
                 text=(
-                    "The criterion bounds the delay of a position loop's passivity; it does not "
-                    "predict a fall. The walk depends on how well it works ahead of the delay and "
-                    "on where the next foot lands. The delays are scaled until it falls, over "
-                    f"{delays.terrains} rough grounds that nothing was chosen on; the controller "
-                    "knows the mean of its command's way."
+                    "The criterion bounds the delay up to which the position loop is passive. It "
+                    "does not predict a fall: the walk depends on the prediction over the delay "
+                    "and on foot placement. The delays are scaled until the robot falls, over "
+                    f"{delays.terrains} held-out rough terrains. The controller knows the mean "
+                    "delay of its command."
                 )
             ),
             Figure(
                 svg=plot_delay_map(delays),
-                caption="What is walked over 7 steps, against spring stiffness and largest total "
-                "delay d_1 = T_H + T_L/2. Lines: bounds for the position loop with the paper's "
-                "gains over the planned walk. Its exact margin is 0, a biped on one point foot "
-                "being a pendulum; drawn is where the delay makes one more pair of roots unstable.",
+                caption=f"What is walked over {found.walk.case.walking.steps} steps, against "
+                "spring stiffness and largest total delay d_1 = T_H + T_L/2. Lines: bounds for the "
+                "position loop with the paper's gains over the planned walk. Its exact margin is "
+                "0, since a biped on one point foot is an inverted pendulum; dotted: the delay at "
+                "which one more pair of roots becomes unstable.",
             ),
             Table(
                 columns=[
@@ -115,9 +116,10 @@ def figure_5_section(found: Findings) -> Section:
         blocks=[
             Text(
                 text=(
-                    "Γ_osc is the torque that the tasks ask for, as late as its command acts at "
-                    "the motors; Γ_sea is the spring torque. The command τ_osc itself is at α = 1 "
-                    "mostly D_θθ̇_d, which the embedded damping takes off again and which hides β."
+                    "Γ_osc is the task torque, delayed until its command acts at the motors; "
+                    "Γ_sea is the spring torque. At α = 1 the command τ_osc consists mostly of the "
+                    "feedforward D_θθ̇_d, which the embedded damping cancels. It masks the effect "
+                    "of β."
                 )
             ),
             Figure(
@@ -167,8 +169,8 @@ def beyond_section(found: Findings) -> Section:
                     [
                         "(i) time-varying J*, Λ and stiffness",
                         "One constant multiplier for the whole planned walk, which V_4 needs, "
-                        f"allows {ms(answer.common_multiplier_delay_s)}; matrices that move "
-                        "as they like inside polytopes around it, window by window, "
+                        f"allows {ms(answer.common_multiplier_delay_s)}; arbitrarily "
+                        "time-varying matrices inside polytopes around it, window by window, "
                         f"{ms(answer.time_varying_delay_s)}; the pointwise bound is "
                         f"{ms(answer.max_delay_s)} "
                         f"({feedback} feedback).",

@@ -161,7 +161,8 @@ def _figure_blocks(figure: Figure4) -> list[Text | Figure | Table]:
                     strict=True,
                 )
             ],
-            caption="At α = 1. The stance leg decides: the swing leg's columns hardly change it.",
+            caption="At α = 1. The stance leg limits the delay; the swing leg's columns hardly "
+            "change it.",
         ),
     ]
 
@@ -185,10 +186,11 @@ def _certified_blocks(figure: Figure4) -> list[Text | Figure | Table]:
     return [
         Text(
             text=(
-                "The certified criterion asks for a symmetric stiffness, a contraction where q̄(θ) "
-                "is fed back, and uses the whole delayed motor-side stiffness of the law that is "
-                "run, gravity compensation included. Passive is not stable: on one point foot the "
-                "robot is an inverted pendulum, and its equilibrium is unstable without any delay."
+                "The certified criterion requires a symmetric stiffness and, where q̄(θ) is fed "
+                "back, a contraction. It uses the whole delayed motor-side stiffness of the law "
+                "that runs, gravity compensation included. Passivity does not imply stability: on "
+                "one point foot the robot is an inverted pendulum, and its equilibrium is unstable "
+                "without any delay."
             )
         ),
         Table(
@@ -219,8 +221,8 @@ def _unsafe_blocks(
                 f"published criterion allows a delay at which the exact loop is unstable for "
                 f"{table.published_longer}; {table.published_without_delay} of these are unstable "
                 f"without any delay. The certified criterion gave a bound for "
-                f"{table.certified_spoke} with a stable equilibrium and was too long for "
-                f"{table.certified_longer}; exact margin over bound is at least "
+                f"{table.certified_spoke} with a stable equilibrium and exceeded the exact margin "
+                f"for {table.certified_longer}; exact margin over bound is at least "
                 f"{table.smallest_ratio:.4f}, in the median {table.median_ratio:.2f}. For "
                 f"{table.undecided} the exact margin could not be decided; they are left out."
             )

@@ -37,7 +37,7 @@ class SeaPlant:
         J: (m, n) task Jacobian.
         Lambda: (m, m) task inertia (J M⁻¹ Jᵀ)⁺.
         K_x: (m,) task gains, 1/s², or N/m for the form `force`.
-        form: stiffness form of THEORY section 6.
+        form: stiffness form of docs/theory section 6.
         signal: what is fed back.
         gravity: `feedback` (G delayed with the rest), `planned` or `none` (no gradient).
         F: (n, n) whole delayed stiffness −∂τ_osc/∂y, Nm/rad.

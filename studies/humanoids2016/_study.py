@@ -25,6 +25,7 @@ from humanoids2016._walk_table import (
 from sealag import __version__ as VERSION
 from sealag.design import System, certify, load, save_motion
 from sealag.errors import InputError
+from sealag.files import make_folder
 from sealag.report import write_run
 from sealag.robot import Motion
 from sealag.walking import plan_walk, walk_motion
@@ -40,7 +41,7 @@ def reproduce(
     """Compute everything and write the page, its CSVs, the planned walk and the recording.
 
     Args:
-        out: folder for all files.
+        out: folder for all files; it is made once the project is known to be right.
         progress: called with a sentence before each part.
         project: a project file with Hume's joints and a [walking] section.
         quick: whether a few cases of each table are enough.
@@ -52,6 +53,8 @@ def reproduce(
         InputError: the project has no [walking] section, or its robot is not Hume.
         FileError: a file cannot be written.
     """
+    _hume(project)
+    make_folder(out)
     found = study(project, QUICK if quick else StudySize(), progress=progress)
     system, walk = found.system, found.walk
     progress("[7/7] writing the page")
@@ -102,9 +105,8 @@ def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> 
     Raises:
         InputError: the project has no [walking] section, or its robot is not Hume.
     """
-    system = load(project)
+    system = _hume(project)
     walking = walking_of(system)
-    _require_hume(system)
     progress(f"[1/7] planning {walking.steps} steps and their whole-body motion")
     motion = planned_walk(system, rate=size.rate)
     progress(f"[2/7] Fig. 4 over {len(motion)} instants")
@@ -164,8 +166,10 @@ def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> 
     )
 
 
-def _require_hume(system: System) -> None:
-    """Refuse a robot without Hume's legs, of which figures and playback are."""
+def _hume(project: str) -> System:
+    """Load a project; one without a walk, or without Hume's legs that figures show, is refused."""
+    system = load(project)
+    walking_of(system)
     names = [f"{side}_{part}" for side in ("left", "right") for part in LEG]
     missing = [name for name in names if name not in system.robot.joints]
     if missing:
@@ -173,6 +177,7 @@ def _require_hume(system: System) -> None:
             f"The study is about Hume; {system.name} has no joint {missing[0]}. Start from "
             "bundled:hume."
         )
+    return system
 
 
 def _some(cases: Mapping[str, WalkCase], size: StudySize) -> dict[str, WalkCase]:

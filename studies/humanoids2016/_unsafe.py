@@ -110,7 +110,7 @@ def _asymmetric_plants(count: int, seed: int) -> list[UnsafeExample]:
 
 
 def unsafe_examples(*, draws: int = 200, seed: int = 20161115) -> tuple[UnsafeExample, ...]:
-    """Compute the examples of THEORY section 6 where (29) allows too long a delay.
+    """Compute the examples of docs/theory section 6 where (29) allows too long a delay.
 
     Args:
         draws: number of random three-joint plants with the printed stiffness ΛK_x.

@@ -19,7 +19,6 @@ from sealag.simulation import (
     Run,
     Scene,
     closed_loop,
-    measure_gait,
 )
 from sealag.typing import Array
 from sealag.walking import Walking, WalkStart, begin_walk
@@ -170,7 +169,7 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
     return Walk(
         case=case,
         run=run,
-        gait=measure_gait(plant, run, case.walking),
+        gait=MeasuredGait.of(plant, run, case.walking),
         task=np.array(asked).reshape(-1, robot.n),
     )
 

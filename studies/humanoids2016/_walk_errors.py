@@ -1,4 +1,4 @@
-"""What a real robot adds to a walk: noisy sensors and a model that is not quite right."""
+"""Sensor noise and model errors of a walk."""
 
 import tempfile
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ class NoisySensors:
     odometry.
 
     Args:
-        controller: Who is to be fooled.
+        controller: The controller behind the sensors.
         robot: The robot.
         noise: How much.
         seed: Of the errors.

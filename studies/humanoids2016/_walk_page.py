@@ -65,8 +65,8 @@ def walk_section(found: Findings) -> Section:
             rows_table(found.robust),
             Text(
                 text=(
-                    "Gains and gait were chosen while looking at some of these grounds. On grounds "
-                    f"that nothing was chosen on, {held_out[0].steps} steps each:"
+                    "Gains and gait were tuned on some of these terrains. On held-out terrains, "
+                    f"{held_out[0].steps} steps each:"
                 )
             ),
             rows_table(held_out),
@@ -84,7 +84,7 @@ def _delay(trip: RoundTrip) -> str:
 
 
 def _why_it_falls(found: Findings) -> str:
-    """How the published law fares, and the torque that its damping takes in the walk above."""
+    """Success of the published law, and the torque that its damping takes in the walk above."""
     run, damping = found.walk.run, found.system.actuators.motor_damping
     speeds = found.system.robot.joint_velocities(run.v)
     knee = next(k for k, name in enumerate(run.joints) if "knee" in name)
@@ -96,11 +96,10 @@ def _why_it_falls(found: Findings) -> str:
         if row.name.startswith(PUBLISHED_LAW)
     )
     return (
-        f"How the law as printed fares, {printed}. In the walk above the knee moves at "
-        f"{rate:.1f} rad/s RMS, where plain D_θθ̇ with {damping[knee]:g} Nms/rad takes "
-        f"{damping[knee] * rate:.0f} Nm, against {carried:.0f} Nm RMS that the springs carry "
-        "there. The printed law has no velocity feedforward that would make up for it, so that "
-        "the swing leg comes late."
+        f"The law as printed, {printed}. In the walk above the knee moves at {rate:.1f} rad/s "
+        f"RMS. There plain damping D_θθ̇ with {damping[knee]:g} Nms/rad takes "
+        f"{damping[knee] * rate:.0f} Nm; the springs carry {carried:.0f} Nm RMS. The printed law "
+        "has no velocity feedforward to compensate the damping, and its swing leg lags."
     )
 
 
@@ -125,13 +124,14 @@ def means_section(found: Findings) -> Section:
     ]
     return Section(
         anchor="means",
-        title="What the means are worth",
+        title="Ablation of the walking controller",
         blocks=[
             Text(
                 text=(
-                    "The law that walks is not the plain delayed position feedback of Theorem 1: "
-                    "it works ahead of its delay with a model, damps θ̇ − θ̇_d and adds a lead "
-                    "term. Theorem 1's bound does not cover it. Each of its means left out:"
+                    "The walking law is not the plain delayed position feedback of Theorem 1: it "
+                    "predicts the state over its delay with a model, damps θ̇ − θ̇_d instead of θ̇ "
+                    "and adds a lead term. The bound of Theorem 1 does not cover it. One element "
+                    "left out at a time:"
                 )
             ),
             rows_table(ablations),
@@ -144,13 +144,12 @@ def means_section(found: Findings) -> Section:
             ),
             Text(
                 text=(
-                    "Not to fall is not yet to walk as planned: of the walks below, "
+                    "A walk without a fall need not keep the planned gait: of the walks below, "
                     f"{sum(row.walked for row in gait)} of {sum(row.terrains for row in gait)} do "
                     f"not fall and {sum(row.gaits for row in gait)} are gaits. Prediction at "
-                    "constant velocity misses how the torques in flight and the change of "
-                    "support turn the velocity; the CoM velocity, by which a pendulum would place "
-                    "its foot, misses the momentum of the legs. Each error alone spoils the "
-                    "footstep:"
+                    "constant velocity neglects the torques in flight and the change of support. "
+                    "Foot placement by the CoM velocity neglects the angular momentum of the "
+                    "legs. Each error alone displaces the footstep:"
                 )
             ),
             rows_table(gait),
@@ -204,11 +203,11 @@ def energy_section(found: Findings) -> Section:
             Text(
                 text=(
                     f"Passivity observer: springs, motors, links and contacts (S_j) were "
-                    f"{joint_side}. The controller side (S_c): the law that walks states no "
-                    f"storage function, and it gave up to {drive.max():.1f} J through the port "
-                    "(τ_osc − D_θθ̇, θ̇); it is passive only with at least as much stored at the "
-                    f"start: lifting the robot took {lifted:.1f} J of it, impacts {impact:.2f} J. "
-                    "The certificate beside it is about the position loop of Theorem 1 alone: "
+                    f"{joint_side}. The walking law has no storage function (S_c). It delivered "
+                    f"up to {drive.max():.1f} J through the port (τ_osc − D_θθ̇, θ̇), and is "
+                    "passive only if it stores at least as much at the start. Lifting the robot "
+                    f"took {lifted:.1f} J of it, impacts {impact:.2f} J. The certificate covers "
+                    "the position loop of Theorem 1 only: "
                     f"{verdict}, d_1 up to {bound:.1f} ms against {question.delay_s * 1e3:.1f} "
                     f"ms, fed back {question.feedback.replace('_', ' ')}."
                 )

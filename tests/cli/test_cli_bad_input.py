@@ -1,15 +1,16 @@
 """Bad input: one sentence that names file, key and remedy, exit status 2, never a traceback."""
 
-from pathlib import Path
+import sys
 
 import numpy as np
 import pytest
 
+from helpers.source import ROOT
 from sealag.cli import main
 from sealag.design import load, motion_table, save_motion
-from sealag.robot import bundled_robot_path
+from sealag.robot import resolve_urdf
 
-GOOD = Path(str(bundled_robot_path("hume"))).with_suffix(".toml").read_text()
+GOOD = resolve_urdf("bundled:hume.urdf").with_suffix(".toml").read_text()
 
 
 def fails(capsys, *arguments):
@@ -336,8 +337,18 @@ USAGE = {
     "no horizon": (["margin", "bundled:hume", "--horizon-ms", "1e300"], "--horizon-ms"),
     "device": (["verify", "/dev/zero"], "regular"),
     "no folder": (["paper", "--out", "/dev/null"], "cannot be made"),
+    "no walk": (
+        ["paper", str(ROOT / "examples/anymal.toml"), "--out", "page"],
+        "no [walking] section",
+    ),
+    "no project": (["paper", "nowhere.toml", "--out", "page"], "nowhere.toml"),
     "one instant": (["certify", "bundled:hume", "--time-varying"], "more than one instant"),
 }
+
+
+def test_a_study_that_is_not_installed_is_named(capsys, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "humanoids2016", None)
+    assert "not installed" in fails(capsys, "paper", "--out", tmp_path)
 
 
 @pytest.mark.parametrize("name", USAGE)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sealag.cli import main
+from helpers.designs import EXAMPLES
 
 ROOT = Path(__file__).resolve().parents[2]
 FIELDS = {
@@ -21,20 +21,11 @@ DESIGNS = ["bundled:hume", *(f"{ROOT}/examples/{n}.toml" for n in
            ("anymal", "anymal_crawl", "talos", "baxter", "hume_held"))]  # fmt: skip
 
 
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stop:
-        main([str(argument) for argument in arguments])
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
-
-
 @pytest.mark.parametrize("design", DESIGNS, ids=lambda d: Path(d).stem)
 @pytest.mark.parametrize("criterion", ["certified", "published"])
-def test_answers_with_the_contract(design, criterion, tmp_path, capsys):
+def test_answers_with_the_contract(design, criterion, tmp_path, cli):
     out = tmp_path / "c.json"
-    code, text, err = run(
-        capsys, "certify", design, "--criterion", criterion, "--json", "--out", out
-    )
+    code, text, err = cli("certify", design, "--criterion", criterion, "--json", "--out", out)
     answer = json.loads(text)
     assert err == ""
     assert set(answer) >= FIELDS
@@ -46,11 +37,11 @@ def test_answers_with_the_contract(design, criterion, tmp_path, capsys):
     margin = answer["local_margin_s"]
     if answer["stable"] and criterion == "certified":
         assert margin is None or margin >= answer["max_delay_s"]
-    code, text, _ = run(capsys, "verify", out, "--json")
+    code, text, _ = cli("verify", out, "--json")
     assert json.loads(text)["valid"] is True
 
 
-def test_motion_of_many_instants(tmp_path, capsys):
+def test_motion_of_many_instants(tmp_path, cli):
     from sealag.design import load, save_motion
     from sealag.walking import GroundProfile, plan_walk, walk_motion
 
@@ -60,8 +51,8 @@ def test_motion_of_many_instants(tmp_path, capsys):
     for ending in (".csv", ".npz", ".parquet"):
         path = tmp_path / f"walk{ending}"
         save_motion(motion, system.robot, path)
-        code, text, _ = run(
-            capsys, "certify", "bundled:hume", "--motion", path, "--json", "--out",
+        code, text, _ = cli(
+            "certify", "bundled:hume", "--motion", path, "--json", "--out",
             tmp_path / "c.json",
         )  # fmt: skip
         answers.append(json.loads(text))
@@ -77,7 +68,8 @@ def test_motion_of_many_instants(tmp_path, capsys):
     assert min(whole["bounds_s"]) == whole["max_delay_s"]
 
 
-def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
+@pytest.mark.slow
+def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, cli):
     """Seven steps at 1 kHz, default proofs, common and time-varying multipliers."""
     from sealag.design import load, save_motion
     from sealag.walking import GroundProfile, plan_walk, walk_motion
@@ -86,8 +78,7 @@ def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
     motion = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=7), rate=1000.0)
     walk, out = tmp_path / "walk.npz", tmp_path / "c.json"
     save_motion(motion, system.robot, walk)
-    code, text, _ = run(
-        capsys,
+    code, text, _ = cli(
         "certify",
         "bundled:hume",
         "--motion",
@@ -102,7 +93,7 @@ def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
     assert 0.0 < answer["time_varying_delay_s"] <= answer["common_multiplier_delay_s"] * (1 + 1e-6)
     assert out.stat().st_size < 2_000_000
     start = time.perf_counter()
-    code, text, _ = run(capsys, "verify", out, "--exact", "--json")
+    code, text, _ = cli("verify", out, "--exact", "--json")
     assert time.perf_counter() - start < 60.0
     result = json.loads(text)
     assert code == 0
@@ -112,7 +103,7 @@ def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, capsys):
     assert any(name.startswith("time-varying multiplier in all") for name in names)
 
 
-def test_proofs_are_as_many_as_asked_for(tmp_path, capsys):
+def test_proofs_are_as_many_as_asked_for(tmp_path, cli):
     from sealag.design import load, save_motion
     from sealag.walking import GroundProfile, plan_walk, walk_motion
 
@@ -122,36 +113,36 @@ def test_proofs_are_as_many_as_asked_for(tmp_path, capsys):
     save_motion(motion, system.robot, walk)
     counts = {}
     for proofs in ("3", "all"):
-        code, _, _ = run(
-            capsys, "certify", "bundled:hume", "--motion", walk, "--proofs", proofs, "--criterion",
-            "published", "--json", "--out", out,
+        code, _, _ = cli(
+            "certify", "bundled:hume", "--motion", walk, "--proofs", proofs,
+            "--criterion", "published", "--json", "--out", out,
         )  # fmt: skip
         counts[proofs] = len(json.loads(out.read_text())["proofs"])
-        code, text, _ = run(capsys, "verify", out)
+        code, text, _ = cli("verify", out)
         assert code == 0
         assert text.endswith("the certificate holds\n")
     assert counts == {"3": 3, "all": len(motion)}
     for wrong in ("0", "-1", "some", "²"):
-        code, _, err = run(capsys, "certify", "bundled:hume", f"--proofs={wrong}", "--out", out)
+        code, _, err = cli("certify", "bundled:hume", f"--proofs={wrong}", "--out", out)
         assert code == 2
         assert "--proofs is" in err
 
 
-def test_a_changed_digit_is_shown(tmp_path, capsys):
+def test_a_changed_digit_is_shown(tmp_path, cli):
     out = tmp_path / "c.json"
-    run(capsys, "certify", ROOT / "examples/baxter.toml", "--json", "--out", out)
+    cli("certify", EXAMPLES / "baxter.toml", "--json", "--out", out)
     data = json.loads(out.read_text())
     number = repr(data["proofs"][0]["W"][0][0][0])
     out.write_text(out.read_text().replace(number, repr(float(number) * 2.0)))
-    code, text, _ = run(capsys, "verify", out)
+    code, text, _ = cli("verify", out)
     assert code == 1
     assert "BAD  content is as written" in text
     assert "BAD  instant 0: matrix inequality" in text
     assert text.endswith("the certificate does not hold\n")
 
 
-def test_margin_command(capsys):
-    code, text, _ = run(capsys, "margin", ROOT / "examples/baxter.toml", "--json")
+def test_margin_command(cli):
+    code, text, _ = cli("margin", EXAMPLES / "baxter.toml", "--json")
     answer = json.loads(text)
     assert code == 0
     assert answer["delay_s"] == pytest.approx(answer["first_crossing_s"])
@@ -160,14 +151,14 @@ def test_margin_command(capsys):
 
 
 @pytest.mark.parametrize("base", ["--fixed", "--floating"])
-def test_starter_file_answers_once_filled(base, tmp_path, capsys):
+def test_starter_file_answers_once_filled(base, tmp_path, cli):
     """Held by its torso Hume is certified; on two point feet no posture of it is at rest."""
-    from sealag.robot import bundled_robot_path
+    from sealag.robot import resolve_urdf
 
     path = tmp_path / "mine.toml"
-    code, _, _ = run(capsys, "init", bundled_robot_path("hume"), "--out", path, base)
+    code, _, _ = cli("init", resolve_urdf("bundled:hume.urdf"), "--out", path, base)
     assert code == 0
-    code, _, err = run(capsys, "certify", path)
+    code, _, err = cli("certify", path)
     assert code == 2
     assert "still to be filled in" in err
     text = path.read_text().replace('"FILL: rad"', "0.1")
@@ -179,30 +170,30 @@ def test_starter_file_answers_once_filled(base, tmp_path, capsys):
             start = text.index(f'"{fill}')
             text = text[:start] + value + text[text.index('"', start + 1) + 1 :]
     path.write_text(text)
-    code, out, err = run(capsys, "certify", path, "--json", "--out", tmp_path / "c.json")
+    code, out, err = cli("certify", path, "--json", "--out", tmp_path / "c.json")
     answer = json.loads(out)
     assert err == ""
     assert code == (0 if base == "--fixed" else 1)
     assert answer["stable"] is (base == "--fixed")
     if base == "--floating":
         assert "no equilibrium" in answer["reasons"][0]
-    assert run(capsys, "verify", tmp_path / "c.json")[0] == 0
-    code, _, err = run(capsys, "init", bundled_robot_path("hume"), "--out", path)
+    assert cli("verify", tmp_path / "c.json")[0] == 0
+    code, _, err = cli("init", resolve_urdf("bundled:hume.urdf"), "--out", path)
     assert code == 2
     assert "exists already" in err
 
 
-def test_help_and_version(capsys):
+def test_help_and_version(cli):
     import sealag
 
-    code, out, _ = run(capsys, "--version")
+    code, out, _ = cli("--version")
     assert (code, out) == (0, f"sealag {sealag.__version__}\n")
     for ask in (["-h"], ["--help"]):
-        code, out, _ = run(capsys, *ask)
+        code, out, _ = cli(*ask)
         assert code == 0
         assert "130 interrupted" in " ".join(out.split())
-    assert "Motion to certify" not in run(capsys, "margin", "-h")[1]
-    assert run(capsys, "--versions")[0] == 2
+    assert "Motion to certify" not in cli("margin", "-h")[1]
+    assert cli("--versions")[0] == 2
 
 
 def test_installed_command_prints_json_only(tmp_path):

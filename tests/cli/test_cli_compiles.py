@@ -3,23 +3,15 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from helpers.certificates import half_a_step
-from sealag.cli import main
+from helpers.designs import EXAMPLES
 from sealag.design import load, save_motion
 from sealag.passivity import write_certificate
 
-ROOT = Path(__file__).resolve().parents[2]
-HELD = ROOT / "examples/hume_held.toml"
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stop:
-        main([str(argument) for argument in arguments])
-    return (int(stop.value.code or 0), *capsys.readouterr())
+HELD = EXAMPLES / "hume_held.toml"
 
 
 @pytest.fixture
@@ -37,7 +29,7 @@ def fresh(monkeypatch):
     return done
 
 
-def test_the_first_run_says_that_it_compiles_and_the_second_is_silent(fresh, tmp_path, capsys):
+def test_the_first_run_says_that_it_compiles_and_the_second_is_silent(fresh, tmp_path, cli):
     out = tmp_path / "c.json"
     for command in (
         ("certify", HELD, "--json", "--out", out),
@@ -46,18 +38,18 @@ def test_the_first_run_says_that_it_compiles_and_the_second_is_silent(fresh, tmp
         ("verify", out, "--project", HELD, "--json"),
     ):
         fresh.clear()
-        code, text, err = run(capsys, *command)
+        code, text, err = cli(*command)
         assert code == 0
         assert text.startswith("{")
         assert err.startswith("sealag: compiling its kernels, once")
         assert "sealag: compiling contact\n" in err
         assert fresh == ["contact"]
-        code, _, err = run(capsys, *command)
+        code, _, err = cli(*command)
         assert (code, err) == (0, "")
         assert fresh == ["contact"]
 
 
-def test_refusals_compile_nothing(fresh, tmp_path, capsys):
+def test_refusals_compile_nothing(fresh, tmp_path, cli):
     import sealag
 
     out, bad, walk = tmp_path / "c.json", tmp_path / "bad.toml", tmp_path / "walk.csv"
@@ -82,15 +74,15 @@ def test_refusals_compile_nothing(fresh, tmp_path, capsys):
         ("verify", bad, "--project", HELD),
         ("init", bad),
     ):
-        code, text, err = run(capsys, *command, *(("--out", out) if command[0] == "init" else ()))
+        code, text, err = cli(*command, *(("--out", out) if command[0] == "init" else ()))
         assert (code, text) == (2, ""), command
         assert "compiling" not in err
-    assert run(capsys, "--help")[0] == 0
+    assert cli("--help")[0] == 0
     assert fresh == []
     write_certificate(sealag.certify(load(HELD)), out)
-    assert run(capsys, "verify", out)[0] == 0
+    assert cli("verify", out)[0] == 0
     assert fresh == [], "a file's own numbers need no kernels"
-    assert run(capsys, "certify", HELD, "--out", out)[0] == 0
+    assert cli("certify", HELD, "--out", out)[0] == 0
     assert fresh == ["contact"], "the control"
 
 

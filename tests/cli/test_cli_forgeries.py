@@ -3,15 +3,15 @@
 import functools
 import json
 import time
-from pathlib import Path
 
 import pytest
 
 import sealag
 from helpers.certificates import plain, resealed
+from helpers.designs import EXAMPLES
 from sealag.cli import main
 
-HELD = Path(__file__).resolve().parents[2] / "examples/hume_held.toml"
+HELD = EXAMPLES / "hume_held.toml"
 NOT_HELD, NO_CERTIFICATE = 1, 2
 LONGEST = 60.0  # s
 

@@ -1,27 +1,19 @@
 """`sealag margin`: the exact margin, and stable and unstable delays beyond it."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sealag
-from sealag.cli import main
+from helpers.designs import EXAMPLES
 from sealag.margin import rightmost_roots
 
-BAXTER = Path(__file__).resolve().parents[2] / "examples/baxter.toml"
+BAXTER = EXAMPLES / "baxter.toml"
 
 
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stop:
-        main(["margin", *(str(argument) for argument in arguments)])
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
-
-
-def test_intervals_agree_with_counted_roots(capsys):
-    code, text, err = run(capsys, BAXTER, "--horizon-ms", "150", "--json")
+def test_intervals_agree_with_counted_roots(cli):
+    code, text, err = cli("margin", BAXTER, "--horizon-ms", "150", "--json")
     answer = json.loads(text)
     assert (code, err) == (0, "")
     ranges = answer["intervals"]
@@ -37,11 +29,11 @@ def test_intervals_agree_with_counted_roots(capsys):
     assert np.unique([part["unstable_roots"] for part in ranges]).size > 1
 
 
-def test_ranges_are_listed_in_words(capsys):
-    code, text, _ = run(capsys, BAXTER, "--horizon-ms", "150")
+def test_ranges_are_listed_in_words(cli):
+    code, text, _ = cli("margin", BAXTER, "--horizon-ms", "150")
     assert code == 0
     assert "0 unstable roots" in text
     assert "4 unstable roots" in text
-    code, text, err = run(capsys, BAXTER, "--horizon-ms", "0")
+    code, text, err = cli("margin", BAXTER, "--horizon-ms", "0")
     assert (code, text) == (2, "")
     assert "horizon" in err

@@ -8,21 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sealag.cli import main
-from sealag.cli._simulate import summary
+from helpers.designs import EXAMPLES
 from sealag.delay import RoundTrip, Sinusoid
 from sealag.design import load, resolve_project, simulate
-from sealag.report import read_recording
+from sealag.report import read_recording, run_summary
 from sealag.walking import WalkingGait, WalkingOptions
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stop:
-        main(["simulate", *(str(argument) for argument in arguments)])
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
 
 
 @pytest.mark.parametrize(
@@ -36,10 +26,10 @@ def run(capsys, *arguments):
         ("hume_held", "drop"),
     ],
 )
-def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, capsys):
+def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, cli):
     out = tmp_path / "run.mcap"
-    code, text, err = run(
-        capsys, EXAMPLES / f"{robot}.toml", "--scenario", scenario, "--duration", "0.5",
+    code, text, err = cli(
+        "simulate", EXAMPLES / f"{robot}.toml", "--scenario", scenario, "--duration", "0.5",
         "--out", out, "--json",
     )  # fmt: skip
     answer = json.loads(text)
@@ -74,20 +64,20 @@ def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, 
     assert np.abs(port - given).max() <= 0.02 * np.abs(given).max() + 1e-9
 
 
-def test_walk_takes_its_steps(tmp_path, capsys):
+def test_walk_takes_its_steps(tmp_path, cli):
     """`--scenario walk` walks what the project describes, and says how the gait is."""
     text = (resolve_project("bundled:hume")).read_text()
     path = tmp_path / "short.toml"
     path.write_text(text.replace("steps = 7", "steps = 3").replace('"paper" }', '"flat" }', 1))
     out = tmp_path / "w.mcap"
-    code, text, err = run(capsys, path, "--scenario", "walk", "--out", out, "--json")
+    code, text, err = cli("simulate", path, "--scenario", "walk", "--out", out, "--json")
     answer = json.loads(text)
     assert (code, err, answer["outcome"]) == (0, "", "completed")
     assert answer["steps"] >= 3
     assert answer["gait"] is True
     assert np.abs(np.array(answer["apex_speed_m_s"]) / 0.5 - 1.0).max() < 0.2
     assert read_recording(out).complete
-    code, _, err = run(capsys, EXAMPLES / "anymal.toml", "--scenario", "walk", "--out", out)
+    code, _, err = cli("simulate", EXAMPLES / "anymal.toml", "--scenario", "walk", "--out", out)
     assert code == 2
     assert "[walking]" in err
 
@@ -102,22 +92,32 @@ def test_the_bundled_walk_is_the_default_one():
     assert set(section["options"]) == {field.name for field in fields(WalkingOptions)}
 
 
-def test_same_seed_same_run(tmp_path, capsys):
+def test_same_seed_same_run(tmp_path, cli):
     text = (EXAMPLES / "baxter.toml").read_text()
     path = tmp_path / "noisy.toml"
     path.write_text(text.replace("value_ms", "jitter_ms = 3.0, packet_loss = 0.1, value_ms", 1))
     ages = []
     for seed in ("1", "1", "2"):
         out = tmp_path / "run.mcap"
-        run(capsys, path, "--scenario", "track", "--duration", "0.1", "--seed", seed, "--out", out)
+        cli(
+            "simulate",
+            path,
+            "--scenario",
+            "track",
+            "--duration",
+            "0.1",
+            "--seed",
+            seed,
+            "--out",
+            out,
+        )
         ages.append(read_recording(out).signals["/delay"].values)
     np.testing.assert_array_equal(ages[0], ages[1])
     assert not np.array_equal(ages[0], ages[2])
 
 
-def test_a_biped_on_point_feet_balances_by_stepping(tmp_path, capsys):
-    code, text, _ = run(
-        capsys, "bundled:hume", "--scenario", "balance", "--duration", "3",
+def test_a_biped_on_point_feet_balances_by_stepping(tmp_path, cli):
+    code, text, _ = cli("simulate", "bundled:hume", "--scenario", "balance", "--duration", "3",
         "--out", tmp_path / "r.mcap", "--json",
     )  # fmt: skip
     answer = json.loads(text)
@@ -127,10 +127,10 @@ def test_a_biped_on_point_feet_balances_by_stepping(tmp_path, capsys):
     assert answer["joint_side_passive"] is True
 
 
-def test_a_fall_is_a_named_result(tmp_path, capsys):
+def test_a_fall_is_a_named_result(tmp_path, cli):
     """Two point feet without a step: the pose is an inverted pendulum."""
-    code, text, _ = run(
-        capsys, "bundled:hume", "--scenario", "regulate", "--out", tmp_path / "r.mcap", "--json"
+    code, text, _ = cli(
+        "simulate", "bundled:hume", "--scenario", "regulate", "--out", tmp_path / "r.mcap", "--json"
     )
     answer = json.loads(text)
     assert code == 0
@@ -139,7 +139,7 @@ def test_a_fall_is_a_named_result(tmp_path, capsys):
     assert read_recording(tmp_path / "r.mcap").complete
 
 
-def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, capsys, monkeypatch):
+def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, cli, monkeypatch):
     out = tmp_path / "r.mcap"
     out.write_bytes(b"before")
 
@@ -148,13 +148,13 @@ def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, capsys, monkeypat
 
     arguments = (EXAMPLES / "baxter.toml", "--duration", "0.01", "--out", out)
     with monkeypatch.context() as patch:
-        patch.setattr("sealag.report._mcap.McapRecorder.note", interrupted)
-        code, text, err = run(capsys, *arguments)
+        patch.setattr("sealag.report.McapRecorder.note", interrupted)
+        code, text, err = cli("simulate", *arguments)
     assert (code, text) == (130, "")
     assert "nothing was recorded" in err
     assert err.endswith("sealag: interrupted\n")
     assert out.read_bytes() == b"before"
-    assert run(capsys, *arguments)[0] == 0
+    assert cli("simulate", *arguments)[0] == 0
     assert read_recording(out).metadata["outcome"] == "completed"
 
 
@@ -168,29 +168,28 @@ def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, capsys, monkeypat
         (["--out", ""], "--out"),
     ],
 )
-def test_bad_scenarios_are_named(arguments, word, tmp_path, capsys):
+def test_bad_scenarios_are_named(arguments, word, tmp_path, cli):
     out = tmp_path / "r.mcap"
-    code, text, err = run(capsys, EXAMPLES / "anymal.toml", "--out", out, *arguments)
+    code, text, err = cli("simulate", EXAMPLES / "anymal.toml", "--out", out, *arguments)
     assert (code, text) == (2, "")
     assert word in err
     assert err.count("\n") == 1
     assert not out.exists()
 
 
-def test_torque_limits_that_cannot_hold(tmp_path, capsys):
+def test_torque_limits_that_cannot_hold(tmp_path, cli):
     text = (EXAMPLES / "anymal.toml").read_text()
     path = tmp_path / "weak.toml"
     path.write_text(text.replace("[[contacts]]", "torque_limit = 2.0\n\n[[contacts]]", 1))
-    code, _, err = run(capsys, path, "--out", tmp_path / "r.mcap")
+    code, _, err = cli("simulate", path, "--out", tmp_path / "r.mcap")
     assert code == 2
     assert "cannot hold this posture" in err
 
 
 @pytest.mark.parametrize("duration", ["0.2", "0.201"])
-def test_the_largest_ages_are_the_certificate_s_wherever_it_ends(duration, capsys, tmp_path):
+def test_the_largest_ages_are_the_certificate_s_wherever_it_ends(duration, cli, tmp_path):
     """ANYmal's links: 4 ms up, 5 ms down, and a hold of 2.5 ms that is no longer than that."""
-    code, text, _ = run(
-        capsys, EXAMPLES / "anymal.toml", "--duration", duration, "--json",
+    code, text, _ = cli("simulate", EXAMPLES / "anymal.toml", "--duration", duration, "--json",
         "--out", tmp_path / "run.mcap",
     )  # fmt: skip
     answer = json.loads(text)
@@ -208,12 +207,12 @@ def test_the_largest_is_printed_and_not_the_mean_or_the_signed_maximum():
         scenario="balance",
         duration=0.3,
     )
-    answer = summary(result, Path("run.mcap"))
+    answer = run_summary(result, recording=Path("run.mcap"))
     assert answer["measurement_age_s"] == result.ages.measurement
     assert answer["measurement_age_s"] > 1.5 * result.measurement_age.mean()
     assert answer["command_age_s"] >= result.command_age.max()
     assert answer["total_age_s"] > answer["command_age_s"]
     law = -np.abs(result.audit.law_injection)
     turned = replace(result, audit=replace(result.audit, law_injection=law))
-    assert summary(turned, Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
+    assert run_summary(turned, recording=Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
     assert answer["injection_error_j"] == result.audit.injection_error > 0.0

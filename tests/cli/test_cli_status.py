@@ -4,11 +4,10 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from sealag.cli import main
+from helpers.designs import EXAMPLES
 from sealag.errors import (
     CertificateError,
     ContractionError,
@@ -18,17 +17,17 @@ from sealag.errors import (
     UnknownNameError,
 )
 
-ROOT = Path(__file__).resolve().parents[2]
-HELD = str(ROOT / "examples/hume_held.toml")
+HELD = str(EXAMPLES / "hume_held.toml")
 ALONE = (sys.executable, "-c", "from sealag.cli import main; main()")
 
 COMMANDS = {
-    "init": (["init", "robot.urdf"], "sealag.cli._commands.init_project"),
-    "certify": (["certify", HELD], "sealag.cli._commands.certify_project"),
-    "margin": (["margin", HELD], "sealag.cli._commands.margin_project"),
-    "verify": (["verify", "c.json"], "sealag.cli._commands.verify_certificate"),
-    "simulate": (["simulate", HELD], "sealag.cli._simulate.simulate_project"),
-    "paper": (["paper"], "sealag.cli._commands.write_paper"),
+    "init": (["init", "robot.urdf"], "sealag.design.starter_project"),
+    "certify": (["certify", HELD], "sealag.design.load"),
+    "margin": (["margin", HELD], "sealag.design.load"),
+    "verify": (["verify", "c.json"], "sealag.passivity.verify"),
+    "simulate": (["simulate", HELD], "sealag.design.load"),
+    "cite": (["cite"], "importlib.resources.files"),
+    "paper": (["paper"], "humanoids2016.reproduce"),
 }
 ENDS = {
     InputError("the posture is wrong"): 2,
@@ -45,22 +44,16 @@ ENDS = {
 }
 
 
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stop:
-        main([str(argument) for argument in arguments])
-    return (int(stop.value.code or 0), *capsys.readouterr())
-
-
 @pytest.mark.parametrize("error", ENDS, ids=lambda error: type(error).__name__)
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_ends_with_the_status_of_its_problem(command, error, monkeypatch, capsys):
+def test_every_command_ends_with_the_status_of_its_problem(command, error, monkeypatch, cli):
     arguments, function = COMMANDS[command]
 
     def fails(*_arguments, **_options):
         raise error
 
     monkeypatch.setattr(function, fails)
-    code, out, err = run(capsys, *arguments)
+    code, out, err = cli(*arguments)
     assert (code, out) == (ENDS[error], "")
     assert err.startswith("sealag: ")
     assert err.strip().count("\n") == 0
@@ -69,16 +62,16 @@ def test_every_command_ends_with_the_status_of_its_problem(command, error, monke
         assert type(error).__name__ in err
 
 
-def test_yes_and_no_are_the_controls(tmp_path, capsys):
+def test_yes_and_no_are_the_controls(tmp_path, cli):
     out = tmp_path / "c.json"
-    assert run(capsys, "certify", HELD, "--out", out)[0] == 0
-    assert run(capsys, "verify", out)[0] == 0
-    assert run(capsys, "margin", HELD)[0] == 0
+    assert cli("certify", HELD, "--out", out)[0] == 0
+    assert cli("verify", out)[0] == 0
+    assert cli("margin", HELD)[0] == 0
     data = json.loads(out.read_text())
     out.write_text(json.dumps({**data, "delay_s": 10.0}))
-    assert run(capsys, "verify", out)[0] == 1
-    assert run(capsys, "certify", "bundled:hume", "--out", out)[0] == 1
-    assert run(capsys, "certify", tmp_path / "none.toml", "--out", out)[0] == 2
+    assert cli("verify", out)[0] == 1
+    assert cli("certify", "bundled:hume", "--out", out)[0] == 1
+    assert cli("certify", tmp_path / "none.toml", "--out", out)[0] == 2
 
 
 def test_an_answer_that_nobody_can_read_is_no_yes(tmp_path):

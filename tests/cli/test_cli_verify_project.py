@@ -2,18 +2,17 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 import sealag
 from helpers.certificates import half_a_step, made, plain, resealed
+from helpers.designs import EXAMPLES
 from sealag.cli import main
 from sealag.design import save_motion, verify_design
 from sealag.passivity import verify, write_certificate
 
-ROOT = Path(__file__).resolve().parents[2]
-BAXTER = ROOT / "examples/baxter.toml"
+BAXTER = EXAMPLES / "baxter.toml"
 
 
 def _later(d):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import sealag
+from helpers.designs import EXAMPLES
 from sealag.design import System
 from sealag.errors import CertificateError
 from sealag.passivity import verify, write_certificate
@@ -46,13 +47,13 @@ def _made(name: str) -> dict[str, Any]:
         )
     if name == "crawl":
         return plain(
-            sealag.certify(sealag.load("examples/anymal_crawl.toml"), criterion="published")
+            sealag.certify(sealag.load(EXAMPLES / "anymal_crawl.toml"), criterion="published")
         )
     if name == "flying":
-        system = sealag.load("examples/anymal.toml")
+        system = sealag.load(EXAMPLES / "anymal.toml")
         law = replace(system.law, signal=MotorAngles())
         return plain(sealag.certify(replace(system, law=law, contacts=())))
-    return plain(sealag.certify(sealag.load("examples/baxter.toml")))
+    return plain(sealag.certify(sealag.load(EXAMPLES / "baxter.toml")))
 
 
 def made(name: str) -> dict[str, Any]:

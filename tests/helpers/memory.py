@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from helpers.designs import EXAMPLES
 from sealag.design import load
 from sealag.walking import GroundProfile, begin_walk
 from sealag.whole_body import Controller, Measurement, Tank
@@ -23,7 +24,7 @@ HOUR = 3_600_000
 
 def standing():
     """Return ANYmal's controller and what it measures."""
-    system = load("examples/anymal.toml")
+    system = load(EXAMPLES / "anymal.toml")
     controller = Controller(
         system.robot, replace(system.law, signal=Tank()), system.actuators,
         contacts=system.contacts, posture=system.posture,

@@ -1,4 +1,4 @@
-"""A MuJoCo model of a robot with series elastic actuators, as THEORY section 12 sets it up.
+"""A MuJoCo model of a robot with series elastic actuators, as docs/theory section 12 sets it up.
 
 Rotor: a hinge of its own with armature B_s and damping D_theta; spring: a fixed tendon between
 rotor (+1) and joint (-1); held foot: a connect equality; delay: MuJoCo's own actuator delay.

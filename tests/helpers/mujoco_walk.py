@@ -86,7 +86,7 @@ class _Feet:
         self.equality = [m.equality(f).id for f in FEET]
         self.anchor = [m.site("anchor_" + f).id for f in FEET]
         self.mode = [Mode.OPEN, Mode.OPEN]
-        self.changed = [False, False]
+        self.changed = self.held = [False, False]
         self.axes = [np.eye(3), np.eye(3)]  # rows: tangent, tangent, normal
         self.slip = np.zeros((2, 2))
         self.contacts: list[tuple[str, float, float]] = []
@@ -101,6 +101,7 @@ class _Feet:
         d = self.twin.data
         d.qfrc_applied[:] = 0.0
         self.changed = [False, False]  # a new mode's force is known after the next step
+        self.held = [mode is Mode.STICK for mode in self.mode]  # in the step whose forces are known
         for f in (0, 1):
             if self.changed[f]:
                 continue
@@ -138,11 +139,9 @@ class _Feet:
         return self.axes[f] @ J
 
     def _check_stick(self, f):
-        d = self.twin.data
-        rows = (d.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (
-            d.efc_id == self.equality[f]
-        )
-        force = self.axes[f] @ d.efc_force[rows]
+        # MuJoCo lists the rows of active equalities first, three each, by their numbers.
+        first = 3 if self.held[1 - f] and self.equality[1 - f] < self.equality[f] else 0
+        force = self.axes[f] @ self.twin.data.efc_force[first : first + 3]
         if force[2] < 0.0:
             self._set(f, Mode.OPEN)
         elif np.hypot(*force[:2]) > self.friction * force[2]:
@@ -199,12 +198,12 @@ class _Feet:
         lift = np.linalg.solve(M, J.T)
         G, free = J @ lift, J @ d.qvel
         impulse = np.zeros(len(free))
+        stiff = {k: np.linalg.norm(G[k : k + 2, k : k + 2], 2) for k in range(0, len(free), 3)}
         for _ in range(2000):
-            for k in range(0, len(free), 3):
+            for k in stiff:
                 n, t = k + 2, slice(k, k + 2)
                 impulse[n] = max(0.0, impulse[n] - (free[n] + G[n] @ impulse) / G[n, n])
-                stiff = np.linalg.norm(G[t, t], 2)
-                impulse[t] -= (free[t] + G[t] @ impulse) / stiff
+                impulse[t] -= (free[t] + G[t] @ impulse) / stiff[k]
                 size = np.hypot(*impulse[t])
                 impulse[t] *= min(1.0, self.friction * impulse[n] / max(size, 1e-300))
         d.qvel += lift @ impulse
@@ -263,8 +262,8 @@ def mujoco_walk(system: System, case: WalkCase, *, step: float) -> MujocoWalk:
         down.send(t, t)
         drive.send(t, down.receive(t))
         acting = drive.receive(t)
+        d.ctrl[:] = command
         for _ in range(round(TICK / step)):
-            d.ctrl[:] = command
             m.actuator_delay[:] = max(d.time - acting - step / 4, 0.0)
             mujoco.mj_step1(m, d)
             mujoco.mj_step2(m, d)

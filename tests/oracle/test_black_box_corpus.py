@@ -20,6 +20,8 @@ from oracle.black_box.rest import NoEquilibrium
 from oracle.black_box.threshold import at_threshold
 from sealag.design import load_motion
 
+pytestmark = pytest.mark.slow
+
 SEED = int(os.environ.get("SEALAG_ORACLE_SEED", 20161115))
 COUNT = int(os.environ.get("SEALAG_ORACLE_COUNT", 300))
 CHUNK = 30

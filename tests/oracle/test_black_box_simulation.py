@@ -14,6 +14,8 @@ from oracle.black_box.box import BlackBox
 from oracle.black_box.roots import Late, roots
 from oracle.black_box.run import deviation, growth
 
+pytestmark = pytest.mark.slow
+
 CASES = Path(__file__).parent / "black_box" / "cases"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sealag
+from helpers.designs import EXAMPLES
 from oracle.black_box.box import BlackBox
 from oracle.black_box.law import Unsettled
 from oracle.black_box.rest import NoEquilibrium
@@ -16,7 +17,6 @@ from oracle.black_box.roots import Late, first_crossing, roots
 from sealag.design import load_motion
 
 CASES = Path(__file__).parent / "black_box" / "cases"
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 def box(path, *, replace=(), folder=None, **options):

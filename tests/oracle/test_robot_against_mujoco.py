@@ -7,11 +7,17 @@ import mujoco
 import numpy as np
 import pytest
 
+from helpers.designs import EXAMPLES
 from sealag.design import load
 from sealag.robot import load_robot
 
 SEED = 11
-PROJECTS = ["bundled:hume", "examples/anymal.toml", "examples/talos.toml", "examples/baxter.toml"]
+PROJECTS = [
+    "bundled:hume",
+    EXAMPLES / "anymal.toml",
+    EXAMPLES / "talos.toml",
+    EXAMPLES / "baxter.toml",
+]
 
 
 def in_mujoco(robot):

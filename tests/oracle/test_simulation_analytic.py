@@ -116,6 +116,7 @@ def _pendulum(folder, step):
     )
 
 
+@pytest.mark.slow
 def test_passive_double_pendulum_keeps_its_energy_for_a_minute(tmp_path):
     run = _pendulum(tmp_path, 1e-3)
     assert run.outcome is Outcome.COMPLETED

@@ -18,6 +18,8 @@ from sealag.delay import Constant, Link
 from sealag.design import load
 from sealag.simulation import Clock, Network, Outcome, Push, Scene, closed_loop
 
+pytestmark = pytest.mark.slow
+
 TICK, DURATION = 8e-3, 0.1
 UP, DOWN, DRIVE = 2.34e-3, 1.17e-3, 0.83e-3
 FINE = 1e-5  # divides all of them, and the push

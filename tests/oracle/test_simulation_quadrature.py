@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_simpson
 from helpers.chains import chain
 from sealag.actuation import actuators
 from sealag.delay import Constant, Link
-from sealag.simulation import Clock, Network, Push, Scene, closed_loop, delay_store
+from sealag.simulation import Clock, Network, Push, Scene, closed_loop
 
 PERIOD, FINE, DURATION = 2e-3, 2e-3 / 16, 0.4
 COULOMB = np.array([0.11, 0.07, 0.05])
@@ -134,7 +134,7 @@ def test_what_the_delay_stores(runs):
     """V_4 of a delay that no period divides, against its double integral; and the tolerance."""
     coarse, fine = runs[0.0]
     Y, delay = np.diag([3.0, 2.0, 1.0]) + 0.3, 0.0333
-    stored, error = delay_store(coarse.time, coarse.theta, coarse.theta_dot, Y, delay=delay)
+    stored, error = coarse.delay_storage(Y, delay=delay)
     power = np.einsum("ki,ij,kj->k", fine.theta_dot, Y, fine.theta_dot)
 
     def exact(t):
@@ -148,7 +148,7 @@ def test_what_the_delay_stores(runs):
     assert wrong.max() <= error
     assert error < 1e-3 * stored.max()
     assert stored[0] == 0.0
-    rounded, _ = delay_store(coarse.time, coarse.theta, coarse.theta_dot, Y, delay=0.034)
+    rounded, _ = coarse.delay_storage(Y, delay=0.034)
     assert np.abs(rounded - dense).max() > 10 * error  # what rounding d would do
 
 

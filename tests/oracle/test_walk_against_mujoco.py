@@ -9,6 +9,8 @@ from helpers.mujoco_walk import mujoco_walk
 from humanoids2016 import WalkCase, simulate_walk
 from sealag.design import load
 
+pytestmark = pytest.mark.slow
+
 HUME = load("bundled:hume")
 CASE = WalkCase(walking=HUME.walking, physics=1.25e-4, embedded=1e-3)
 

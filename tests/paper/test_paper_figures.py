@@ -29,6 +29,8 @@ from sealag.design import load
 from sealag.walking import GroundProfile
 from sealag.whole_body import StiffnessForm
 
+pytestmark = pytest.mark.slow
+
 HUME = load("bundled:hume")
 
 

@@ -9,7 +9,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from humanoids2016 import QUICK, AblationTable, DelayMap, study, write_paper_page
+from humanoids2016 import (
+    QUICK,
+    AblationTable,
+    DelayMap,
+    planned_walk,
+    simulate_walk,
+    study,
+    write_paper_page,
+)
+from sealag.design import load, resolve_project
+
+pytestmark = pytest.mark.slow
 
 
 class Links(HTMLParser):
@@ -28,11 +39,26 @@ class Links(HTMLParser):
                 self.outside.append(target)
 
 
+HUME = resolve_project("bundled:hume")
+WALK = {
+    "steps = 7": "steps = 3",
+    "apex_speed = 0.5 ": "apex_speed = 0.45 ",
+    'terrain = { kind = "paper" }': 'terrain = { kind = "flat" }',
+}
+"""What the page's project walks otherwise than the bundled one."""
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """A page from few cases, and what went into it."""
     out = tmp_path_factory.mktemp("page")
-    found = study("bundled:hume", QUICK, progress=lambda _: None)
+    project = tmp_path_factory.mktemp("project") / "hume.toml"
+    text = HUME.read_text()
+    for before, after in WALK.items():
+        assert text.count(before) == 1
+        text = text.replace(before, after)
+    project.write_text(text)
+    found = study(str(project), QUICK, progress=lambda _: None)
     everywhere = AblationTable(
         means=("everything", "no lead"), conditions=("K = 200", "α = 2", "no delay"), terrains=7,
         walked=np.array([[7, 6, 5], [4, 3, 2]]), gaits=np.array([[6, 5, 4], [1, 1, 0]]),
@@ -76,6 +102,24 @@ def test_page_needs_no_network_and_holds_the_numbers(written):
     csv = np.genfromtxt(out / "figure4.csv", delimiter=",", names=True)
     np.testing.assert_allclose(csv["one_leg_delay_s_D10"], figure.delay_s[1], rtol=1e-8)
     assert len((out / "figure4_instants.csv").read_text().splitlines()) == len(found.motion) + 1
+
+
+def test_the_page_shows_the_projects_own_walk(written):
+    """Feet, ground, gait and steps of [walking]; the bundled project walks otherwise."""
+    found, text = written.found, written.page.read_text()
+    walking, bundled = found.system.walking, load("bundled:hume")
+    assert "planned 3-step walk" in text
+    assert "the planned 0.45 m/s" in text
+    assert "the planned 0.5 m/s" not in text
+    assert found.walk.case.walking == walking
+    assert {row.steps for row in (*found.robust, *found.ablations, *found.gains)} == {3}
+    assert found.walk.gait.place[:, 2] == pytest.approx(walking.gait.foot_radius, abs=1e-3)
+    again = simulate_walk(found.system)
+    np.testing.assert_array_equal(again.run.q, found.walk.run.q)
+    theirs = simulate_walk(bundled)
+    assert len(theirs.run.time) > len(again.run.time)
+    assert np.abs(theirs.run.q[: len(again.run.time)] - again.run.q).max() > 1e-2
+    assert len(planned_walk(bundled, rate=QUICK.rate)) > len(found.motion)
 
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")

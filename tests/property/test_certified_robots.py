@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from helpers.designs import EXAMPLES
 from sealag.design import certified_bounds, load, margin_of, published_bounds
 from sealag.errors import SolverError
 from sealag.margin import rightmost_roots
@@ -27,6 +28,8 @@ from sealag.whole_body import (
     Tank,
     Task,
 )
+
+pytestmark = pytest.mark.slow
 
 SEED, DRAWS = 4, 130
 MOTOR, STATIC, TANK = MotorAngles(), StaticJoint(), Tank(rate=0.0)
@@ -63,7 +66,7 @@ def clamped(frame):
 def design(name):
     """The project's own design, or one that stands on a foot as if screwed down."""
     robot = name.split()[-1] if name.startswith("clamped") else name.split()[0]
-    system = load("bundled:hume" if robot == "hume" else f"examples/{robot}.toml")
+    system = load("bundled:hume" if robot == "hume" else EXAMPLES / f"{robot}.toml")
     unlimited = replace(system.actuators, torque_limit=np.full(system.robot.n, np.inf))
     system = replace(system, actuators=unlimited)
     if name == robot or name == "hume on point feet":

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from helpers.designs import EXAMPLES
-from sealag.cli._simulate import summary
 from sealag.design import load, simulate
 from sealag.errors import SealagError
+from sealag.report import run_summary
 from sealag.simulation import Outcome
 from sealag.whole_body import SIGNAL_NAMES, GravityCompensation, signal_named
+
+pytestmark = pytest.mark.slow
 
 NAMES = ("anymal", "anymal_crawl", "baxter", "hume_held", "talos")
 SCENARIOS = ("regulate", "track", "drop", "balance")
@@ -99,7 +101,7 @@ def test_no_design_ends_in_a_traceback(name):
             ends["refused"] += 1
             continue
         assert bool(run.message) == (run.outcome is not Outcome.COMPLETED)
-        json.dumps(summary(run, Path("run.mcap")), allow_nan=False)
+        json.dumps(run_summary(run, recording=Path("run.mcap")), allow_nan=False)
         ends["completed" if run.outcome is Outcome.COMPLETED else "ended"] += 1
     assert min(ends[end] for end in ("refused", "completed")) > 0
     assert (ends["ended"] > 0) == system.robot.floating_base

@@ -12,6 +12,8 @@ from sealag.margin import delay_margin
 from sealag.passivity import Instant, Problem, solve
 from sealag.simulation import Clock, Network, Outcome, Push, Scene, closed_loop
 
+pytestmark = pytest.mark.slow
+
 
 def _bound(arm):
     """The passive bound of the arm's delayed stiffness."""

@@ -6,14 +6,8 @@ import pytest
 from scipy.optimize import minimize
 
 from sealag.kernels import contact, friction, rigid
-from sealag.robot import load_robot
 
 FEET = ("left_foot", "right_foot")
-
-
-@pytest.fixture(scope="module")
-def hume():
-    return load_robot("bundled:hume.urdf", floating_base=True)
 
 
 class TestManifold:

@@ -8,6 +8,7 @@ import pytest
 
 import sealag
 from helpers.certificates import failures, plain
+from helpers.designs import EXAMPLES
 from sealag.delay import Constant, Delays
 from sealag.design import verify_design
 from sealag.second_verifier import claims
@@ -25,7 +26,7 @@ DRIVES = {
 @functools.cache
 def design(drive, late, signal="static_joint"):
     """Hume held by its torso, with friction and damping beside springs and B_s = B/2."""
-    system = sealag.load("examples/hume_held.toml")
+    system = sealag.load(EXAMPLES / "hume_held.toml")
     changed = {"viscous_friction": [0.7] * 6, "spring_damping": [0.3] * 6} | DRIVES[drive]
     drives = replace(system.actuators, **{key: np.array(v) for key, v in changed.items()})
     embedded = Constant(value=2e-3 if late == "late" else 0.0)
@@ -98,7 +99,7 @@ def test_another_drive_in_the_loop_is_found(part):
 
 def test_a_posture_that_nothing_rests_in_says_so_and_no_more():
     """ANYmal on two point feet falls: no equilibrium, and q̄(θ) has no loop there."""
-    system = sealag.load("examples/anymal.toml")
+    system = sealag.load(EXAMPLES / "anymal.toml")
     data = plain(sealag.certify(replace(system, contacts=system.contacts[:2])))
     assert (data["status"], data["stable"]) == ("not_certified", False)
     assert failures(data) == []

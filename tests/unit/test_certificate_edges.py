@@ -12,7 +12,7 @@ import pytest
 
 import sealag
 from helpers.certificates import failures, plain, resealed
-from sealag.delay import Constant, Delays, measured
+from sealag.delay import Constant, Delays, Table
 from sealag.passivity import Criterion, verify
 from sealag.robot import Contact, ContactKind
 from sealag.whole_body import MotorAngles, StiffnessForm, Task
@@ -148,7 +148,7 @@ def test_what_the_delay_stands_for_is_said():
 
 def test_two_ways_with_a_quantile_are_one_assumption():
     """Keys of assumptions are not repeated, or no check of the certificate would hold."""
-    samples = measured([1e-3] * 9 + [5e-3], period=0.01, quantile=0.8)
+    samples = Table.measured([1e-3] * 9 + [5e-3], period=0.01, quantile=0.8)
     system = replace(standing(), delays=Delays(central=samples, embedded=samples))
     data = plain(sealag.certify(system))
     said = [one["text"] for one in data["assumptions"] if one["key"] == "delay_quantile"]

@@ -2,13 +2,13 @@
 
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sealag
 from helpers.certificates import failures, made, plain, resealed
+from helpers.designs import EXAMPLES
 from humanoids2016 import random_sea_plant
 from sealag.margin import delay_margin, rightmost_roots
 from sealag.passivity import verify
@@ -237,7 +237,7 @@ def test_files_stay_small():
 
 def test_a_loop_that_gains_stability_before_its_first_crossing_is_no_contradiction(tmp_path):
     """Without contacts ANYmal's base turns with its legs: two roots move left on the way."""
-    text = Path("examples/anymal.toml").read_text()
+    text = (EXAMPLES / "anymal.toml").read_text()
     project = tmp_path / "floating.toml"
     project.write_text(re.sub(r'\[\[contacts\]\]\nframe = "\w+"\n', "", text))
     certificate = sealag.certify(sealag.load(project))

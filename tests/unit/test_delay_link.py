@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sealag.delay import Constant, Link, PacketOrder, Share, Sinusoid, Table
+from sealag.delay import Constant, Link, PacketOrder, RoundTrip, Sinusoid, Table
 from sealag.errors import InputError
 
 PERIOD = 1e-3
@@ -170,7 +170,7 @@ def test_losses_have_their_rate_and_bursts_their_limit_across_blocks():
 
 
 def test_whether_a_link_is_constant():
-    assert Link(delay=Share(signal=Constant(0.01), fraction=0.5)).constant
+    assert RoundTrip.halved(Constant(0.01)).up.constant
     assert not Link(delay=Constant(0.01), jitter=1e-3).constant
     assert not Link(delay=Constant(0.01), loss=0.1).constant
     assert not Link(delay=Table(time=np.arange(2.0), delay=np.array([0.01, 0.02]))).constant

@@ -1,14 +1,13 @@
 """The links that a project file describes are those that run, and its d_1 bounds what arrives."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import sealag
+from helpers.designs import EXAMPLES
 from sealag.errors import ProjectError
 
-BAXTER = (Path(__file__).resolve().parents[2] / "examples/baxter.toml").read_text()
+BAXTER = (EXAMPLES / "baxter.toml").read_text()
 
 NETWORKS = {
     "constant": """

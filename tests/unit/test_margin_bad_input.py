@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sealag.errors import InputError
-from sealag.margin import delay_margin, delay_margins, rightmost_roots
+from sealag.margin import delay_margin, rightmost_roots
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_other_arguments_are_checked_the_same_way() -> None:
     with pytest.raises(InputError, match="delay is no array of numbers"):
         rightmost_roots([[0.0]], [[-1.0]], "soon")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="A_0 is complex"):
-        delay_margins(1j * np.ones((1, 1, 1)), np.ones((1, 1, 1)))
+        delay_margin(1j * np.ones((1, 1)), np.ones((1, 1)))
 
 
 def test_numbers_of_other_kinds_are_taken() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from humanoids2016 import random_sea_plant
 from sealag.errors import InputError, SolverError
-from sealag.margin import delay_margin, delay_margins, rightmost_roots
+from sealag.margin import delay_margin, rightmost_roots
 
 
 def collocated(A_0, A_1, A_e, d: float, e: float, *, nodes: int = 44) -> np.ndarray:
@@ -116,15 +116,14 @@ def test_symmetries_are_divided_out_with_the_embedded_part() -> None:
     assert answer.neutral == 1
     assert answer.delay == pytest.approx(known.delay, rel=1e-8)
     wide[2][4, 4] = -1.0
-    with pytest.raises(SolverError, match="moved by the dynamics"):
+    with pytest.raises(SolverError, match="no symmetry of the loop"):
         delay_margin(*wide[:2], A_e=wide[2], embedded_delay=0.01, symmetries=free)
 
 
-def test_many_loops_take_the_embedded_part_too() -> None:
+def test_an_embedded_part_of_zeros_is_none() -> None:
     A_0, A_1, A_e = drive(0)
-    first, second = delay_margins([A_0] * 2, [A_1] * 2, A_e=[A_e, 0.0 * A_e], embedded_delay=0.01)
-    assert first.delay == delay_margin(A_0, A_1, A_e=A_e, embedded_delay=0.01).delay
-    assert second.delay == delay_margin(A_0, A_1).delay
+    none = delay_margin(A_0, A_1, A_e=0.0 * A_e, embedded_delay=0.01)
+    assert none.delay == delay_margin(A_0, A_1).delay
 
 
 def test_embedded_part_is_checked() -> None:

@@ -5,6 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 FLAT = 16e6
 """Bytes an hour of a 1 kHz controller: 11 pages of 4 KiB in the 10,000 ticks that are measured."""

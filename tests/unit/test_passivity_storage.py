@@ -1,4 +1,4 @@
-"""Stored energy falls below the bound and rises beyond it, on one-joint plants of THEORY 6b.
+"""Stored energy falls below the bound and rises beyond it: docs/theory section 6, one joint.
 
 V_1 … V_4 are the storage functions of the paper's Section IV-B, written out here.
 """
@@ -13,7 +13,7 @@ from helpers.controllers import StoringPD
 from helpers.levels import instant_bound
 from sealag.actuation import actuators
 from sealag.delay import Constant, Link
-from sealag.simulation import Network, closed_loop, delay_store
+from sealag.simulation import Network, closed_loop
 
 K, B_S, D = 350.0, 0.09, 10.0
 STEP = 1e-4
@@ -34,6 +34,20 @@ def motor_storage(inertia, rate, stiffness, tau_sea):
 def task_storage(F, deviation):
     """V_3 = ½ δᵀ F δ."""
     return 0.5 * float(np.asarray(deviation) @ np.asarray(F) @ np.asarray(deviation))
+
+
+def delay_storage(rate, Y, delay):
+    """V_4 = 1/(2d) ∫_{t−d}^{t} (ξ − t + d) Y θ̇² dξ = (d P(t) − PP(t) + PP(t−d)) / 2d, P = ∫ Y θ̇²
+    and PP = ∫ P by the trapezoidal rule."""
+
+    def integral(values):
+        steps = 0.5 * STEP * (values[1:] + values[:-1])
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    lag, P = round(delay / STEP), integral(Y * rate**2)
+    PP = integral(P)
+    before = np.concatenate([np.zeros(lag), PP[:-lag]])
+    return (delay * P - PP + before) / (2.0 * delay)
 
 
 def run(M, F, delay, *, duration=6.0):
@@ -66,8 +80,7 @@ def run(M, F, delay, *, duration=6.0):
 def energy(M, F, delay, states):
     """V_1 + V_2 + V_3 + V_4, with a multiplier that proves the delay."""
     bound = replace(instant_bound([[F]], [D]), delay=np.array(delay))
-    time, theta, rate = STEP * np.arange(len(states)), states[:, [1]], states[:, [3]]
-    V_4, _ = delay_store(time, theta, rate, bound.prove().multiplier, delay=delay)
+    V_4 = delay_storage(states[:, 3], bound.prove().multiplier[0, 0], delay)
     others = [
         link_storage([[M]], [v])
         + motor_storage([B_S], [w], [K], [K * (theta - q)])

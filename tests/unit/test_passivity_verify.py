@@ -10,6 +10,7 @@ import pytest
 import sealag
 import sealag.passivity
 from helpers.certificates import failures, made, plain, resealed, without_loop
+from helpers.designs import EXAMPLES
 from sealag.errors import CertificateError, InputError
 from sealag.passivity import Criterion, read_certificate, verify, write_certificate
 
@@ -237,7 +238,7 @@ def test_what_is_read_is_what_was_written(design):
 
 
 def test_a_certificate_has_no_truth_value():
-    certificate = sealag.certify(sealag.load("examples/baxter.toml"))
+    certificate = sealag.certify(sealag.load(EXAMPLES / "baxter.toml"))
     with pytest.raises(TypeError, match="status"):
         bool(certificate)
     assert plain(certificate)["hashes"]["content"] != certificate.question.hashes["project"]
@@ -255,7 +256,7 @@ def dissipates(data, delay, *, exact):
 
 def test_doubles_never_call_definite_what_rationals_do_not():
     """At the longest delay of a multiplier, bisected in rationals, and as near to it as 1e-15."""
-    data = without_loop(plain(sealag.certify(sealag.load("examples/hume_held.toml"))))
+    data = without_loop(plain(sealag.certify(sealag.load(EXAMPLES / "hume_held.toml"))))
     low = data["max_delay_s"]
     high = 1.01 * low
     while high > low * (1.0 + 1e-14):
@@ -277,7 +278,7 @@ def test_infinite_bounds_are_certified_without_numbers(criterion):
     """A design whose tasks have no stiffness tolerates any delay."""
     from dataclasses import replace
 
-    system = sealag.load("examples/baxter.toml")
+    system = sealag.load(EXAMPLES / "baxter.toml")
     tasks = tuple(replace(task, stiffness=0.0 * task.stiffness) for task in system.law.tasks)
     system = replace(system, law=replace(system.law, tasks=tasks, gravity="planned"))
     data = plain(sealag.certify(system, criterion=criterion))

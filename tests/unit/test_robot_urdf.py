@@ -5,7 +5,7 @@ import pytest
 
 from helpers.mimics import MIMICS, joint, link, robot
 from sealag.errors import RobotError, SealagError, UnknownNameError
-from sealag.robot import Contact, Follower, example_robot_path, load_robot
+from sealag.robot import Contact, load_robot
 
 ARM = (link("base"), link("a"), link("b"), joint("j", "base", "a"), joint("k", "a", "b"))
 
@@ -105,7 +105,7 @@ def test_what_can_be_is_read(name, tmp_path):
      "bolt_description/robots/bolt.urdf", "icub_description/robots/icub_reduced.urdf"],
 )  # fmt: skip
 def test_placeholders_of_public_robots_are_no_reason(path):
-    assert load_robot(example_robot_path(path), floating_base=True).n > 0
+    assert load_robot(f"example-robot-data:{path}", floating_base=True).n > 0
 
 
 def test_a_link_goes_before_a_joint_of_its_name(tmp_path):
@@ -143,8 +143,9 @@ def test_carriers_move_a_frame_themselves_or_through_followers(tmp_path):
 
 def test_followers_are_told_with_the_joint_that_leads(tmp_path):
     followers = read(tmp_path, MIMICS).followers
-    assert followers["slide"] == Follower(leader="lead", multiplier=-0.5, offset=0.1)
-    assert followers["chain"] == Follower(leader="lead", multiplier=-1.5, offset=0.5)
+    slide, chain = followers["slide"], followers["chain"]
+    assert (slide.leader, slide.multiplier, slide.offset) == ("lead", -0.5, 0.1)
+    assert (chain.leader, chain.multiplier, chain.offset) == ("lead", -1.5, 0.5)
     assert followers["chain"].position(2.0) == pytest.approx(-2.5)
     with pytest.raises(UnknownNameError, match="chain of r follows lead"):
         read(tmp_path, MIMICS).configuration({"chain": 0.1})

@@ -149,4 +149,4 @@ def test_it_runs_as_a_file_and_by_the_command(tmp_path, capsys):
         assert err.count("\n") == 1
     code, _, err = command(path, "--exact")
     assert code == 2
-    assert "--second stands alone" in err
+    assert "--second takes no --exact" in err

@@ -11,7 +11,7 @@ from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD, StoringPD
 from sealag.actuation import actuators
 from sealag.delay import Constant, Link, PacketOrder, Sinusoid
-from sealag.robot import Contact, load_robot
+from sealag.robot import Contact
 from sealag.simulation import (
     Clock,
     Foot,
@@ -25,11 +25,6 @@ from sealag.walking import GroundProfile
 
 FEET = ("left_foot", "right_foot")
 ROTOR = np.array([0.1357, 0.093, 0.093] * 2)
-
-
-@pytest.fixture(scope="module")
-def hume():
-    return load_robot("bundled:hume.urdf", floating_base=True)
 
 
 def _standing(robot, clearance=0.0):

@@ -16,7 +16,6 @@ from sealag.delay import (
     RoundTrip,
     Sinusoid,
     Table,
-    measured,
 )
 from sealag.simulation import Clock, Exchanges, Network, closed_loop
 
@@ -35,7 +34,7 @@ signals = st.one_of(
         st.lists(st.floats(0, 0.02), min_size=1, max_size=30),
     ),
     st.builds(
-        lambda seed: measured(np.random.default_rng(seed).uniform(0, 0.02, 60), period=2e-3),
+        lambda seed: Table.measured(np.random.default_rng(seed).uniform(0, 0.02, 60), period=2e-3),
         st.integers(0, 9),
     ),
 )

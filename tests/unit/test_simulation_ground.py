@@ -8,7 +8,6 @@ from sealag.actuation import actuators
 from sealag.errors import InputError
 from sealag.robot import Contact, ContactKind, load_robot
 from sealag.simulation import Clock, Foot, Outcome, Push, Scene, closed_loop
-from sealag.simulation._ground import contact_frame
 from sealag.walking import GroundProfile
 
 
@@ -24,24 +23,15 @@ class Slope:
 
 
 class SlopeWithNormal(Slope):
-    """The same with its own normal."""
+    """The same with its own normal, of some length, turned by an angle about y."""
+
+    def __init__(self, rise, turned=0.0):
+        super().__init__(rise)
+        self.angle = np.arctan(rise) + turned
 
     def normal(self, x, y):
-        """Return a normal of any length."""
-        return np.array([-self.rise, 0.0, 1.0])
-
-
-@pytest.mark.parametrize("kind", [Slope, SlopeWithNormal])
-def test_contact_frame_of_a_slope(kind):
-    C = contact_frame(kind(0.3), 0.2, -0.1)
-    np.testing.assert_allclose(C @ C.T, np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(C[2], np.array([-0.3, 0, 1]) / np.hypot(0.3, 1), atol=1e-9)
-    np.testing.assert_allclose(contact_frame(GroundProfile.flat(2.0), 0, 0), np.eye(3))
-
-
-@pytest.fixture(scope="module")
-def hume():
-    return load_robot("bundled:hume.urdf", floating_base=True)
+        """Return the normal."""
+        return 3.0 * np.array([-np.sin(self.angle), 0.0, np.cos(self.angle)])
 
 
 def _run(robot, ground, friction, duration=0.2):
@@ -80,6 +70,24 @@ def test_feet_hold_on_a_slope_only_with_enough_friction(hume):
     np.testing.assert_allclose(foot[1][closed, 2], 0.3 * foot[1][closed, 0], atol=1e-6)
     for run in (held, slid):
         assert run.audit.closure < 1e-5
+
+
+def test_a_slope_s_own_normal_is_that_of_its_heights(hume):
+    """The control turns it by a tenth of a degree: a frictionless foot then slides elsewhere."""
+    heights, own, turned = (
+        _run(hume, ground, 1e-9)
+        for ground in (Slope(0.3), SlopeWithNormal(0.3), SlopeWithNormal(0.3, np.deg2rad(0.1)))
+    )
+    apart = [np.abs(run.q - heights.q).max() for run in (own, turned)]
+    assert apart[0] < 1e-7
+    assert apart[1] > 1e-4
+
+
+def test_a_level_ground_is_a_slope_that_does_not_rise(hume):
+    flat, high = _run(hume, GroundProfile.flat(2.0), 0.5), _run(hume, Slope(0.0), 0.5)
+    down = np.zeros(flat.q.shape[1])
+    down[2] = 2.0
+    np.testing.assert_allclose(flat.q - down, high.q, atol=1e-7)
 
 
 class TestSoles:

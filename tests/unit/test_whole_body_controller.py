@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from helpers.chains import planar_arm
+from helpers.designs import EXAMPLES
 from sealag.actuation import actuators
 from sealag.design import load
 from sealag.errors import ContractionError, InputError, UnknownNameError
@@ -34,8 +35,8 @@ from sealag.whole_body import (
     signal_named,
 )
 
-ANYMAL = load("examples/anymal.toml")
-BAXTER = load("examples/baxter.toml")
+ANYMAL = load(EXAMPLES / "anymal.toml")
+BAXTER = load(EXAMPLES / "baxter.toml")
 HUME = load("bundled:hume")
 ONE_FOOT = (Contact(frame="right_foot"),)
 STANCES = {

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from helpers.designs import EXAMPLES
 from sealag.actuation import actuators
 from sealag.design import certified_bounds, load
 from sealag.robot import Contact, ContactKind, Motion
@@ -20,9 +21,9 @@ from sealag.whole_body import (
 )
 
 HUME = load("bundled:hume")
-ANYMAL = load("examples/anymal.toml")
-BAXTER = load("examples/baxter.toml")
-TALOS = load("examples/talos.toml")
+ANYMAL = load(EXAMPLES / "anymal.toml")
+BAXTER = load(EXAMPLES / "baxter.toml")
+TALOS = load(EXAMPLES / "talos.toml")
 
 
 def motion_of(system, q, contacts):

@@ -17,62 +17,106 @@ from sealag.whole_body import (
     Task,
     TaskKind,
 )
-from sealag.whole_body._tank import EnergyTank
 
 STEP = 1e-3
 M, K, B_S, D, K_Q = 1.0, 350.0, 0.09, 10.0, 100.0
 BOUND = D / K_Q  # 1 / w with J*: the tank's x̂ is as soft as the motor angle
 
 
-def tank(*, size=3, energy=0.2, rate=5.0, delay_bound=0.05, flow=TankFlow.CORRECTED):
-    return EnergyTank(size=size, energy=energy, rate=rate, delay_bound=delay_bound, flow=flow)
+class Posed:
+    """Three joints held by one posture task of a given stiffness, through the tick that runs.
+
+    J* = I and τ_osc = S (x_d − x̂), so that the command shows x̂, and q̄(θ) has a closed form.
+    """
+
+    def __init__(self, folder, S, *, delay_bound=0.05, start=None, **options):
+        arm = planar_arm(folder, count=3, mass=1.0, inertia=0.05, length=0.4)
+        drives = actuators(arm.joints, spring_stiffness=K, rotor_inertia=0.1, motor_damping=10.0)
+        task = Task(name="posture", kind=TaskKind.POSTURE, stiffness=S)
+        law = Law(
+            tasks=(task,),
+            signal=Tank(**options),
+            gravity=GravityCompensation.NONE,
+            stiffness_form=StiffnessForm.FORCE,
+            velocity_feedforward=False,
+        )
+        self.wanted, self.t, self.S = np.zeros(3), 0.0, S
+        self._controller = Controller(
+            arm, law, drives, posture=np.zeros(3), delay_bound=delay_bound,
+            reference=lambda t: (self.wanted, np.zeros(3)),
+        )  # fmt: skip
+        self._seen, self._out = Measurement.allocate(nq=3, nv=3, n=3), np.zeros(3)
+        self._controller.reset(0.0, self._seen)
+        self.tick(0.0, np.zeros(3))
+
+    def tick(self, period, moved):
+        """Move the motors and run one tick."""
+        self.t += period
+        self._seen.theta[:] += moved
+        self._controller.tick(self.t, self._seen, self._out)
+        self.x_hat = self.wanted - np.linalg.solve(self.S, self._out)
+
+    @property
+    def target(self):
+        """q̄ of K (θ − q̄) = S (x_d − q̄)."""
+        load = K * self._seen.theta - self.S @ self.wanted
+        return np.linalg.solve(K * np.eye(3) - self.S, load)
+
+    @property
+    def energy(self):
+        return self._controller.tank_energy
 
 
-def moves(seed, size=3, count=400):
-    """Random targets and motor moves, with a stiffness, as a rough run would give them."""
-    rng = np.random.default_rng(seed)
-    X = rng.normal(size=(size, size))
-    S = X @ X.T + np.eye(size)
+def stiffness(rng):
+    X = rng.normal(size=(3, 3))
+    return 5.0 * (X @ X.T + np.eye(3))
+
+
+def ticks(rng, count):
+    """Periods, moves of the motors and references, as a rough run would give them."""
     for _ in range(count):
-        yield rng.normal(size=size), 0.05 * rng.normal(size=size), rng.choice([0.0, 1e-3, 0.05]), S
+        yield rng.choice([0.0, 1e-3, 0.05]), 0.05 * rng.normal(size=3), rng.normal(size=3)
 
 
 @pytest.mark.parametrize("flow", list(TankFlow))
 @pytest.mark.parametrize("seed", range(5))
-def test_tank_is_never_overdrawn_and_an_empty_one_does_nothing(flow, seed):
-    full, empty = tank(flow=flow), tank(flow=flow, energy=0.0)
-    idle = 0
-    for target, moved, period, S in moves(seed):
-        before = full.position.copy()
-        full.step(period, moved, wanted=np.zeros(3), target=target, stiffness=S)
+def test_tank_is_never_overdrawn_and_an_empty_one_does_nothing(flow, seed, tmp_path):
+    rng = np.random.default_rng(seed)
+    S, idle = stiffness(rng), 0
+    full = Posed(tmp_path, S, energy=0.2, flow=flow)
+    for period, moved, full.wanted in ticks(rng, 400):
+        before = full.x_hat
+        full.tick(period, moved)
         assert full.energy >= 0.0
-        idle += np.array_equal(full.position, before + moved)
+        idle += np.allclose(full.x_hat, before + moved, rtol=0.0, atol=1e-12)
     assert 0 < idle < 400, "it should have paid for some steps and refused others"
-    start = empty.position.copy()
-    # u away from the wanted position costs, so that a tank with nothing in it leaves x̂ alone.
-    target = start + np.ones(3)
-    empty.step(1e-3, np.zeros(3), wanted=start, target=target, stiffness=np.eye(3))
+    empty, moved = Posed(tmp_path, S, energy=0.0, flow=flow), np.array([0.1, -0.2, 0.3])
+    # q̄ lies further from x_d than θ: u would load the task's spring, and there is nothing to pay.
+    empty.tick(1e-3, moved)
+    assert np.linalg.norm(empty.target) > 1.01 * np.linalg.norm(moved)
     assert empty.energy == 0.0
-    np.testing.assert_array_equal(empty.position, start)
+    np.testing.assert_allclose(empty.x_hat, moved, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("flow", list(TankFlow))
-def test_energy_is_what_the_step_costs_to_the_last_bit(flow):
+def test_energy_is_what_the_step_costs_to_rounding(flow, tmp_path):
     """Corrected: what u does to V_3, and u's part of T ½ d̄ |x̂̇|²_S; published: the last alone."""
-    one, wanted = tank(energy=1e3, flow=flow), np.array([0.3, -0.2, 0.1])
-    d = 0.05
-    for target, moved, period, S in moves(7, count=50):
+    rng, d = np.random.default_rng(7), 0.05
+    S = stiffness(rng)
+    one = Posed(tmp_path, S, delay_bound=d, energy=1e3, flow=flow)
+    for period, moved, wanted in ticks(rng, 50):
+        one.wanted = wanted
+        before, energy = one.x_hat, one.energy
+        one.tick(period, moved)
         if period == 0.0:
             continue
-        before, energy = one.position.copy(), one.energy
-        one.step(period, moved, wanted=wanted, target=target, stiffness=S)
-        u = (one.position - before - moved) / period
+        u = (one.x_hat - before - moved) / period
 
-        def V_3(x, S=S):
+        def V_3(x, wanted=wanted):
             return 0.5 * (wanted - x) @ S @ (wanted - x)
 
-        half = before + 0.5 * (one.position - before)
-        spring = V_3(one.position) - V_3(before) + (wanted - half) @ S @ moved
+        half = before + 0.5 * (one.x_hat - before)
+        spring = V_3(one.x_hat) - V_3(before) + (wanted - half) @ S @ moved
         rate = u + moved / period
         delay = 0.5 * d * period * (rate @ S @ rate - moved @ S @ moved / period**2)
         cost = delay + (spring if flow is TankFlow.CORRECTED else 0.0)
@@ -80,12 +124,15 @@ def test_energy_is_what_the_step_costs_to_the_last_bit(flow):
         assert abs(spring) > 1e-9, "without work of u the two flows could not be told apart"
 
 
-def test_x_hat_goes_to_its_target_however_long_the_period():
+def test_x_hat_goes_to_its_target_however_long_the_period(tmp_path):
+    S = stiffness(np.random.default_rng(1))
     for period in (1e-3, 0.1, 100.0):
-        one, S = tank(energy=1e6, rate=20.0), np.eye(3)
+        one = Posed(tmp_path, S, energy=1e6, rate=20.0)
+        one.tick(0.0, np.full(3, 0.1))
+        assert np.abs(one.x_hat - one.target).max() > 1e-3
         for _ in range(int(1.0 / period) + 1):
-            one.step(period, np.zeros(3), wanted=np.ones(3), target=np.ones(3), stiffness=S)
-        np.testing.assert_allclose(one.position, 1.0, atol=1e-6)
+            one.tick(period, np.zeros(3))
+        np.testing.assert_allclose(one.x_hat, one.target, atol=1e-6)
 
 
 def simulate_one_joint(folder, flow, *, up=0.0, rate=20.0, duration=1.5, spring_work=True):

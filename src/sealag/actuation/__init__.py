@@ -1,27 +1,12 @@
 """Series elastic actuators with their embedded controller, and how transparent they are."""
 
-from sealag.actuation._actuators import (
-    Actuators,
-    actuators,
-    actuators_of,
-    joint_values,
-    motor_parameters,
-)
-from sealag.actuation._transparency import (
-    Transparency,
-    deviation_rms,
-    torque_transfer,
-    transparency,
-)
+from sealag.actuation._actuators import Actuators, actuators, actuators_of, motor_parameters
+from sealag.actuation._transparency import transparency
 
 __all__ = [
     "Actuators",
-    "Transparency",
     "actuators",
     "actuators_of",
-    "deviation_rms",
-    "joint_values",
     "motor_parameters",
-    "torque_transfer",
     "transparency",
 ]

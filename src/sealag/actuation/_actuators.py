@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, Required, TypedDict, Unpack, cast
 
 import numpy as np
 
-from sealag.errors import InputError
+from sealag.errors import InputError, near
 from sealag.robot import Robot
 from sealag.typing import Array, ArrayLike
 
@@ -53,74 +54,98 @@ class Actuators:
         return self.shaped_inertia / self.rotor_inertia
 
 
-def actuators(
-    joints: Sequence[str],
-    *,
-    spring_stiffness: ArrayLike,
-    rotor_inertia: ArrayLike,
-    motor_damping: ArrayLike,
-    inertia_shaping: ArrayLike = 1.0,
-    spring_damping: ArrayLike = 0.0,
-    coulomb_friction: ArrayLike = 0.0,
-    viscous_friction: ArrayLike = 0.0,
-    torque_limit: ArrayLike = np.inf,
-    velocity_limit: ArrayLike = np.inf,
-    torque_bandwidth: ArrayLike = np.inf,
-) -> Actuators:
+class DriveValues(TypedDict, total=False):
+    """What describes drives: one number for all joints, or one for each.
+
+    Attributes:
+        spring_stiffness: K, Nm/rad, positive.
+        rotor_inertia: B, kg m², positive.
+        motor_damping: D_θ, Nms/rad, positive.
+        inertia_shaping: β = B_s / B, positive; 1 if not given.
+        spring_damping: D_s, Nms/rad; 0 if not given.
+        coulomb_friction: Nm; 0 if not given.
+        viscous_friction: Nms/rad; 0 if not given.
+        torque_limit: Nm, none if not given; a motor with 0 gives nothing.
+        velocity_limit: rad/s, positive; none if not given.
+        torque_bandwidth: rad/s, positive; ideal if not given.
+    """
+
+    spring_stiffness: Required[ArrayLike]
+    rotor_inertia: Required[ArrayLike]
+    motor_damping: Required[ArrayLike]
+    inertia_shaping: ArrayLike
+    spring_damping: ArrayLike
+    coulomb_friction: ArrayLike
+    viscous_friction: ArrayLike
+    torque_limit: ArrayLike
+    velocity_limit: ArrayLike
+    torque_bandwidth: ArrayLike
+
+
+class _Range(NamedTuple):
+    """Which values a quantity may take, and the one that it has if it is not given."""
+
+    default: float | None
+    positive: bool
+    finite: bool
+
+
+_RANGES: dict[str, _Range] = {
+    "spring_stiffness": _Range(None, positive=True, finite=True),
+    "rotor_inertia": _Range(None, positive=True, finite=True),
+    "motor_damping": _Range(None, positive=True, finite=True),
+    "inertia_shaping": _Range(1.0, positive=True, finite=True),
+    "spring_damping": _Range(0.0, positive=False, finite=True),
+    "coulomb_friction": _Range(0.0, positive=False, finite=True),
+    "viscous_friction": _Range(0.0, positive=False, finite=True),
+    "torque_limit": _Range(np.inf, positive=False, finite=False),
+    "velocity_limit": _Range(np.inf, positive=True, finite=False),
+    "torque_bandwidth": _Range(np.inf, positive=True, finite=False),
+}
+
+
+def actuators(joints: Sequence[str], **values: Unpack[DriveValues]) -> Actuators:
     """Build actuators from numbers that are the same for all joints, or one for each.
 
     Args:
         joints: names, in the robot's order.
-        spring_stiffness: K, Nm/rad, positive.
-        rotor_inertia: B, kg m², positive.
-        motor_damping: D_θ, Nms/rad, positive.
-        inertia_shaping: β = B_s / B, positive.
-        spring_damping: D_s, Nms/rad.
-        coulomb_friction: Nm.
-        viscous_friction: Nms/rad.
-        torque_limit: Nm, inf for none; a motor with 0 gives nothing.
-        velocity_limit: rad/s, positive, inf for none.
-        torque_bandwidth: rad/s, positive, inf for an ideal torque loop.
+        values: spring_stiffness, rotor_inertia, motor_damping and what else `DriveValues` names.
 
     Raises:
-        InputError: a length is wrong, or a value is NaN, negative, or 0 where it must not be.
+        InputError: a length is wrong, one of these three is missing, or a value is NaN, negative,
+            or 0 where it must not be.
+        UnknownNameError: there is no such quantity.
     """
     names = tuple(joints)
-
-    def take(name: str, values: ArrayLike, *, positive: bool, finite: bool = True) -> Array:
-        return joint_values(names, values, name=name, positive=positive, finite=finite)
-
-    B = take("rotor_inertia", rotor_inertia, positive=True)
-    beta = take("inertia_shaping", inertia_shaping, positive=True)
-    return Actuators(
-        joints=names,
-        spring_stiffness=take("spring_stiffness", spring_stiffness, positive=True),
-        rotor_inertia=B,
-        shaped_inertia=beta * B,
-        motor_damping=take("motor_damping", motor_damping, positive=True),
-        spring_damping=take("spring_damping", spring_damping, positive=False),
-        coulomb_friction=take("coulomb_friction", coulomb_friction, positive=False),
-        viscous_friction=take("viscous_friction", viscous_friction, positive=False),
-        torque_limit=take("torque_limit", torque_limit, positive=False, finite=False),
-        velocity_limit=take("velocity_limit", velocity_limit, positive=True, finite=False),
-        torque_bandwidth=take("torque_bandwidth", torque_bandwidth, positive=True, finite=False),
-    )
+    for name in values:
+        if name not in _RANGES:
+            raise near(name, _RANGES, what="quantity of a drive")
+    taken = {}
+    for name, allowed in _RANGES.items():
+        given = values.get(name, allowed.default)
+        if given is None:
+            raise InputError(f"{name} is missing; give one number, or one for each joint.")
+        taken[name] = _joint_values(names, given, name=name, allowed=allowed)
+    shaping = taken.pop("inertia_shaping")
+    return Actuators(joints=names, shaped_inertia=shaping * taken["rotor_inertia"], **taken)
 
 
-def actuators_of(robot: Robot, **values: ArrayLike) -> Actuators:
+def actuators_of(robot: Robot, **values: Unpack[DriveValues]) -> Actuators:
     """Build a robot's actuators; limits and friction that are not given are those of its URDF.
 
     A speed limit of 0 in a URDF forbids every motion: it stands for one that is not known.
 
     Args:
         robot: the robot.
-        values: as `actuators` takes them, one number for all joints or (n,). A NaN among
-            torque_limit, velocity_limit or coulomb_friction stands for the URDF's value.
+        values: as `actuators` takes them. A NaN among torque_limit, velocity_limit or
+            coulomb_friction stands for the URDF's value.
 
     Raises:
         InputError: as `actuators` raises it.
+        UnknownNameError: there is no such quantity.
     """
     moving = np.where(robot.velocity_limit > 0.0, robot.velocity_limit, np.inf)
+    filled = dict(values)
     for name, own in (
         ("torque_limit", robot.effort_limit),
         ("velocity_limit", moving),
@@ -128,26 +153,12 @@ def actuators_of(robot: Robot, **values: ArrayLike) -> Actuators:
     ):
         given = np.asarray(values.get(name, np.nan))
         if given.dtype.kind in "fiu" and given.shape in ((), own.shape):
-            values[name] = np.where(np.isnan(given), own, given)
-    return actuators(robot.joints, **values)  # pyright: ignore[reportCallIssue]
+            filled[name] = np.where(np.isnan(given), own, given)
+    return actuators(robot.joints, **cast(DriveValues, filled))
 
 
-def joint_values(
-    joints: Sequence[str], values: ArrayLike, *, name: str, positive: bool, finite: bool = True
-) -> Array:
-    """Return one number for each joint, checked.
-
-    Args:
-        joints: names.
-        values: () or (n,).
-        name: what messages call the quantity.
-        positive: whether 0 is refused too.
-        finite: whether infinity is refused.
-
-    Raises:
-        InputError: the length is wrong, or a value is NaN, infinite, negative or 0; the message
-            names the joint.
-    """
+def _joint_values(joints: Sequence[str], values: ArrayLike, *, name: str, allowed: _Range) -> Array:
+    """Return one number for each joint (n,), checked; messages name the joint."""
     given = np.asarray(values)
     if given.dtype.kind not in "fiu":
         raise InputError(f"{name} is {values!r}; one number, or one for each joint, is right.")
@@ -158,12 +169,12 @@ def joint_values(
         raise InputError(
             f"{name} has {array.size} values; one, or {len(joints)} (one for each joint) is right."
         )
-    bad = np.isnan(array) | (array < 0.0) | (positive & (array == 0.0))
-    if finite:
+    bad = np.isnan(array) | (array < 0.0) | (allowed.positive & (array == 0.0))
+    if allowed.finite:
         bad |= np.isinf(array)
     if bad.any():
         at = int(bad.argmax())
-        need = "positive" if positive else "0 or positive"
+        need = "positive" if allowed.positive else "0 or positive"
         raise InputError(f"{name} of joint {joints[at]} is {array[at]:g}; it must be {need}.")
     return np.array(array)
 

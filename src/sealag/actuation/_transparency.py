@@ -1,4 +1,4 @@
-"""How well the spring torque follows its command: the price of damping (THEORY section 9)."""
+"""How well the spring torque follows its command: the price of damping (docs/theory section 9)."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ class Transparency:
     phase_lag: Array
 
 
-def torque_transfer(actuators: Actuators, frequency: ArrayLike, *, delay: float = 0.0) -> Array:
+def _torque_transfer(actuators: Actuators, frequency: ArrayLike, *, delay: float = 0.0) -> Array:
     """Return τ_sea / τ_osc = K / (B_s s² + D_θ s + K) · e^{−s d_2} with the link locked.
 
     Args:
@@ -53,19 +53,9 @@ def transparency(actuators: Actuators, *, delay: float = 0.0) -> Transparency:
     half = D**2 / (2.0 * B_s**2) - K / B_s
     root = np.sqrt(half**2 + (K / B_s) ** 2)
     squared = np.where(half > 0.0, (K / B_s) ** 2 / (root + np.abs(half)), root - half)
-    lag = -np.unwrap(np.angle(torque_transfer(actuators, [1e-3, 1.0], delay=delay)), axis=0)[1]
+    lag = -np.unwrap(np.angle(_torque_transfer(actuators, [1e-3, 1.0], delay=delay)), axis=0)[1]
     return Transparency(
         bandwidth=np.sqrt(squared) / (2.0 * np.pi),
         damping_ratio=D / (2.0 * np.sqrt(K * B_s)),
         phase_lag=lag,
     )
-
-
-def deviation_rms(command: ArrayLike, achieved: ArrayLike) -> Array:
-    """Return the RMS deviation (n,) of the spring torque from its command, Nm.
-
-    Args:
-        command: (N, n) τ_osc, Nm.
-        achieved: (N, n) τ_sea, Nm.
-    """
-    return np.sqrt(np.mean((np.asarray(command) - np.asarray(achieved)) ** 2, axis=0))

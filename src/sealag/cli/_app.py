@@ -1,17 +1,16 @@
-"""The command line: parse, call one function, show. Nothing heavy is imported until it is used."""
+"""The command line: options, exit statuses, messages. Commands import what they use."""
 
-import json
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
-from sealag import __version__
 from sealag.errors import SealagError, SolverError
+from sealag.version import __version__
 
 WRONG_INPUT, FAILED = 2, 3
 """Exit statuses besides 0, yes, and 1, a decided no."""
@@ -22,8 +21,8 @@ INTERRUPTED = 130
 app = typer.Typer(
     name="sealag",
     help="How much network delay a robot with springs in its joints tolerates.",
-    epilog="Exit status: 0 done, 1 the answer is no (not certified, certificate does not hold), "
-    "2 the input is wrong, 3 the tool failed, 130 interrupted.",
+    epilog="Exit status: 0 yes or done, 1 no (not certified, certificate does not hold), 2 wrong "
+    "input, 3 the tool failed or its answer could not be written, 130 interrupted.",
     context_settings={"help_option_names": ["-h", "--help"]},
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -36,8 +35,8 @@ MotionFile = Annotated[
     Path | None,
     typer.Option(
         "--motion",
-        help="Motion along which to look: CSV, NPZ or Parquet with named columns; the project's "
-        "motion, else its posture, if not given.",
+        help="Motion to check: CSV, NPZ or Parquet with named columns. Default: the project's "
+        "motion, else its posture.",
     ),
 ]
 
@@ -62,10 +61,10 @@ def _options(
 def init(
     urdf: Annotated[str, typer.Argument(help="The robot's URDF.")],
     out: Annotated[
-        Path | None, typer.Option("--out", help="Where to write; ROBOT.toml if not given.")
+        Path | None, typer.Option("--out", help="Project file to write. Default: ROBOT.toml.")
     ] = None,
     floating: Annotated[
-        bool, typer.Option("--floating/--fixed", help="Whether the base moves freely.")
+        bool, typer.Option("--floating/--fixed", help="Whether the base floats.")
     ] = True,
 ) -> None:
     """Write a commented project file with the robot's own joints in it."""
@@ -81,29 +80,28 @@ def certify(
     motion: MotionFile = None,
     criterion: Annotated[
         str | None,
-        typer.Option("--criterion", help="certified or published; the project's if not given."),
+        typer.Option("--criterion", help="certified or published. Default: the project's."),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Certificate file; PROJECT.certificate.json if not given."),
+        typer.Option("--out", help="Certificate to write. Default: PROJECT.certificate.json."),
     ] = None,
     time_varying: Annotated[
         bool,
         typer.Option(
-            "--time-varying", help="Also for matrices that move inside polytopes (1 s more)."
+            "--time-varying", help="Also bound matrices that vary in polytopes around the motion."
         ),
     ] = False,
     proofs: Annotated[
         str,
         typer.Option(
             "--proofs",
-            help="Instants whose numbers go into the certificate, those with the smallest bounds: "
-            "a number, or all.",
+            help="How many instants are proven in the certificate, smallest bounds first; or all.",
         ),
     ] = "12",
     as_json: Json = False,
 ) -> None:
-    """Bound the delay at every instant of a motion; exit status 1 if it is not certified."""
+    """Bound the delay at every instant of a motion; status 1 if the design is not certified."""
     from sealag.cli._commands import certify_project
 
     raise typer.Exit(
@@ -125,7 +123,7 @@ def margin(
     motion: MotionFile = None,
     horizon_ms: Annotated[
         float | None,
-        typer.Option("--horizon-ms", help="List stable and unstable delays up to this one."),
+        typer.Option("--horizon-ms", help="List ranges of stable delays up to this one."),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -138,28 +136,28 @@ def margin(
 @app.command()
 def verify(
     certificate: Annotated[Path, typer.Argument(help="Certificate file.")],
-    exact: Annotated[bool, typer.Option("--exact", help="Decide in rational arithmetic.")] = False,
+    exact: Annotated[bool, typer.Option("--exact", help="Check in rational arithmetic.")] = False,
     second: Annotated[
         bool,
         typer.Option(
             "--second",
-            help="Run the second verifier instead: one file of the standard library, all rational.",
+            help="Run the second verifier instead: one file of the standard library, exact.",
         ),
     ] = False,
     project: Annotated[
         str | None,
         typer.Option(
             "--project",
-            help="Also check hashes, delay and all that follows from this project and its URDF.",
+            help="Compute matrices, bounds and delay again from this project, and compare.",
         ),
     ] = None,
     motion: Annotated[
         Path | None,
-        typer.Option("--motion", help="The motion that was certified; with --project."),
+        typer.Option("--motion", help="Motion that was certified; needs --project."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a certificate from its numbers alone, or also against its project; 1 if it is bad."""
+    """Check a certificate from its own numbers, or against its project; status 1 if it fails."""
     from sealag.cli._commands import verify_certificate
 
     raise typer.Exit(
@@ -181,25 +179,25 @@ def simulate(
         str | None,
         typer.Option(
             "--scenario",
-            help="regulate, track, drop, balance or walk; simulation.scenario if not given.",
+            help="regulate, track, drop, balance or walk. Default: simulation.scenario.",
         ),
     ] = None,
     duration: Annotated[
         float | None,
         typer.Option(
             "--duration",
-            help="Seconds; simulation.duration_s, or the length of the walk, if not given.",
+            help="Seconds. Default: simulation.duration_s, or the length of the walk.",
         ),
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option("--seed", help="Of jitter and losses; simulation.seed if not given."),
+        typer.Option("--seed", help="Seed of jitter and packet loss. Default: simulation.seed."),
     ] = None,
     delay_scale: Annotated[
         float, typer.Option("--delay-scale", help="Factor on both round trips.")
     ] = 1.0,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Recording; PROJECT.mcap if not given.")
+        Path | None, typer.Option("--out", help="Recording to write. Default: PROJECT.mcap.")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -236,17 +234,16 @@ def paper(
     write_paper(project, out, quick=quick, as_json=as_json)
 
 
-def show_json(answer: dict[str, Any]) -> None:
-    """Print one JSON object to standard output.
+@app.command()
+def cite(as_json: Json = False) -> None:
+    """Print BibTeX entries for sealag and for the paper that it reproduces."""
+    from sealag.cli._cite import show_citations
 
-    Args:
-        answer: what to print; it must hold finite numbers only.
-    """
-    print(json.dumps(answer, allow_nan=False))
+    show_citations(as_json=as_json)
 
 
 def _write_no_more() -> None:
-    """Drop what standard output did not take, which would end the process with another status."""
+    """Discard unwritten output: flushing it at exit would change the status."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -256,8 +253,8 @@ def _write_no_more() -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and end the process with its status.
 
-    0 done, 1 the answer is no, 2 the input is wrong, 3 the tool failed, 130 interrupted. Wrong
-    input and failures are told in one sentence on standard error.
+    0 yes or done, 1 no, 2 wrong input, 3 the tool failed or its answer could not be written, 130
+    interrupted. Wrong input and failures are one sentence on standard error.
 
     Args:
         arguments: what follows the program's name; the process's own if None.

@@ -1,4 +1,4 @@
-"""What the commands do: call one function of the library and show its answer."""
+"""Commands: each calls one function of the library and shows its answer."""
 
 import os
 import sys
@@ -8,18 +8,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from sealag.cli._app import show_json
-from sealag.design import (
-    System,
-    certify,
-    check_question,
-    load,
-    load_motion,
-    resolve_project,
-    starter_project,
-)
+from sealag import design
+from sealag.cli._json import show_json
+from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
-from sealag.files import check_output, make_folder, write_text
+from sealag.files import check_output, write_text
 from sealag.passivity import Answer, Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
@@ -41,13 +34,13 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     named = urdf
     if ":" not in urdf:
         named = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
-    text = starter_project(urdf, floating_base=floating_base, named=named)
+    text = design.starter_project(urdf, floating_base=floating_base, named=named)
     write_text(path, text)
     return path
 
 
 def compile_kernels() -> None:
-    """Compile what is not in the cache yet, and say so: it takes minutes after an installation."""
+    """Compile kernels that are not cached, with a message: minutes, once an installation."""
     from sealag.kernels import compile_all, compiled
 
     if compiled():
@@ -61,7 +54,7 @@ def compile_kernels() -> None:
 
 @contextmanager
 def _busy(what: str) -> Iterator[None]:
-    """Say on a terminal's standard error what takes its time."""
+    """Show a spinner on standard error if it is a terminal."""
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -71,7 +64,9 @@ def _busy(what: str) -> Iterator[None]:
 
 def _motion(system: System, path: Path | None) -> Motion | None:
     chosen = path or system.motion_file
-    return None if chosen is None else load_motion(chosen, system.robot, contacts=system.contacts)
+    if chosen is None:
+        return None
+    return design.load_motion(chosen, system.robot, contacts=system.contacts)
 
 
 def certify_project(
@@ -89,14 +84,14 @@ def certify_project(
         raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
     if proofs != "all" and not (proofs.isascii() and proofs.isdigit() and int(proofs) > 0):
         raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
-    path = out or Path(f"{resolve_project(project).stem}.certificate.json")
-    system = load(project)
+    path = out or Path(f"{design.resolve_project(project).stem}.certificate.json")
+    system = design.load(project)
     check_output(path, *system.files, *([motion] if motion else []))
     along, count = _motion(system, motion), None if proofs == "all" else int(proofs)
-    check_question(system, along, criterion, time_varying=time_varying, proofs=count)
+    design.check_question(system, along, criterion, time_varying=time_varying, proofs=count)
     compile_kernels()
     with _busy("certifying"):
-        certificate = certify(
+        certificate = design.certify(
             system, along, criterion=criterion, time_varying=time_varying, proofs=count
         )
     write_certificate(certificate, path)
@@ -108,10 +103,10 @@ def certify_project(
 
 
 def _stability(answer: Answer) -> str:
-    """What is known of stability without delay, which a passive loop need not have."""
+    """Stability without delay, in words; a passive loop need not be stable."""
     if answer.unstable_modes:
         count = answer.unstable_modes
-        return f"no: {count} root{'s' * (count > 1)} without decay, already without delay"
+        return f"no: {count} unstable root{'s' * (count > 1)} without delay"
     if answer.stable is None:
         return "not known"
     return "yes" if answer.stable else "no"
@@ -139,17 +134,17 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
         ("certificate", str(path)),
     ]
     if answer.common_multiplier_delay_s is not None:
-        rows.insert(3, ("with one multiplier", time_text(answer.common_multiplier_delay_s)))
+        rows.insert(3, ("one multiplier for all", time_text(answer.common_multiplier_delay_s)))
     if answer.time_varying_delay_s is not None:
-        rows.insert(4, ("with matrices that move", time_text(answer.time_varying_delay_s)))
+        rows.insert(4, ("time-varying matrices", time_text(answer.time_varying_delay_s)))
     for name, value in rows:
         print(f"{name:26} {value}")
     if answer.status is Status.CERTIFIED and answer.stable is not True:
-        print("passive, but not stable by itself: without other means the robot falls or drifts")
+        print("passive but not stable: without further control the robot falls or drifts")
     for reason in answer.reasons:
         print(f"not certified because {reason}")
     for bound, reason in answer.left_open.items():
-        print(f"left open is a longer {bound}: {reason}")
+        print(f"open whether {bound} is longer: {reason}")
     for assumption in answer.assumptions:
         print(f"assumed: {assumption.text}")
 
@@ -158,19 +153,17 @@ def margin_project(
     project: str, motion: Path | None, *, horizon_ms: float | None, as_json: bool
 ) -> None:
     """Show the exact local margin at every instant, or at a sample of a long motion."""
-    from sealag.design import local_margins
-
     if horizon_ms is not None and not 0.0 < horizon_ms <= LONGEST_HORIZON_MS:
         raise InputError(
             f"--horizon-ms is {horizon_ms:g}; it must be more than 0 and at most "
             f"{LONGEST_HORIZON_MS:g}."
         )
-    system = load(project)
+    system = design.load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
     along = _motion(system, motion)
     compile_kernels()
     with _busy("computing margins"):
-        found = local_margins(system, along, horizon=horizon)
+        found = design.local_margins(system, along, horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)
@@ -179,8 +172,8 @@ def margin_project(
     print(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
     if found.frequency_rad_s is not None:
         print(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
-    print(f"{'without decay':26} {found.unstable_modes} of the roots without delay")
-    print(f"{'neutral by symmetry':26} {found.neutral} roots")
+    print(f"{'unstable roots':26} {found.unstable_modes} without delay")
+    print(f"{'zero roots of symmetries':26} {found.neutral}")
     print(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
     mode = sorted(found.mode.items(), key=lambda item: -item[1])
     print(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
@@ -198,23 +191,24 @@ def verify_certificate(
     as_json: bool,
 ) -> int:
     """Check a certificate, against its project if one is given; 1 if it does not hold."""
-    from sealag.design import verify_design
     from sealag.passivity import read_certificate, verify
 
     if second:
         if exact or project is not None or motion is not None:
-            raise InputError("--second stands alone: it is exact and knows the file only.")
+            raise InputError(
+                "--second takes no --exact, --project or --motion: it reads the file alone."
+            )
         return _second(path, as_json=as_json)
     if project is None:
         if motion is not None:
-            raise InputError("--motion says nothing without --project.")
+            raise InputError("--motion needs --project.")
         result = verify(path, exact=exact)
     else:
         read_certificate(path)
-        system = load(project)
+        system = design.load(project)
         along = _motion(system, motion)
         compile_kernels()
-        result = verify_design(path, system, along, exact=exact)
+        result = design.verify_design(path, system, along, exact=exact)
     if as_json:
         show_json(result.to_json_dict())
     else:
@@ -263,7 +257,6 @@ def write_paper(project: str, out: Path, *, quick: bool, as_json: bool) -> None:
             f"The study of the paper is not installed: Python finds no package {STUDY}. It comes "
             "with sealag's wheel; in a checkout run make setup."
         ) from error
-    make_folder(out)
     answer = study.reproduce(
         out,
         project=project,

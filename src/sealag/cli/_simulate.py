@@ -1,4 +1,4 @@
-"""`sealag simulate`: run, record, and account for the energy."""
+"""`sealag simulate`: run a scenario, write the recording, print the energy audit."""
 
 import sys
 from collections.abc import Callable
@@ -7,15 +7,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-import sealag
-from sealag.cli._app import show_json
+from sealag import design
 from sealag.cli._commands import compile_kernels
-from sealag.design import System, load, resolve_project, scenario_duration, simulate
+from sealag.cli._json import show_json
+from sealag.design import System
 from sealag.errors import InputError
 from sealag.files import check_output
-from sealag.report import write_run
-from sealag.simulation import Outcome, Passivity, Run, measure_gait
-from sealag.typing import Array
+from sealag.report import run_summary, write_run
+from sealag.simulation import MeasuredGait, Outcome, Run
+from sealag.version import __version__
 
 T = TypeVar("T")
 Progress = Callable[[float], None]
@@ -32,10 +32,10 @@ def simulate_project(
     as_json: bool,
 ) -> None:
     """Run a scenario with a progress bar, write the recording and show the audit."""
-    path = out or Path(f"{resolve_project(project).stem}.mcap")
-    system = load(project)
+    path = out or Path(f"{design.resolve_project(project).stem}.mcap")
+    system = design.load(project)
     check_output(path, *system.files)
-    length = scenario_duration(system, scenario) if duration is None else duration
+    length = design.scenario_duration(system, scenario) if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"--duration is {length}; a positive time in s is needed.")
     try:
@@ -46,7 +46,7 @@ def simulate_project(
     run = _with_progress(
         "simulating",
         length,
-        lambda progress: simulate(
+        lambda progress: design.simulate(
             system,
             scenario=scenario,
             duration=length,
@@ -56,7 +56,7 @@ def simulate_project(
         ),
     )
     _record(run, system, path)
-    answer = summary(run, path)
+    answer = run_summary(run, recording=path)
     if (system.simulation.scenario if scenario is None else scenario) == "walk":
         answer |= gait_summary(system, run)
     if as_json:
@@ -85,7 +85,7 @@ def _record(run: Run, system: System, path: Path) -> None:
                 system.robot,
                 path,
                 project=system.text,
-                version=sealag.__version__,
+                version=__version__,
                 progress=progress,
             ),
         )
@@ -107,54 +107,6 @@ def _with_progress(name: str, length: float, call: Callable[[Progress | None], T
         return call(lambda t: bar.update(task, completed=t))
 
 
-def summary(run: Run, path: Path) -> dict[str, Any]:
-    """Return what a run's JSON answer holds.
-
-    Args:
-        run: the run.
-        path: its recording.
-    """
-    books = run.audit
-    joint, central, delay = books.joint_side, books.controller_side, books.delay_side
-    return {
-        "outcome": run.outcome.value,
-        "message": run.message,
-        "duration_s": float(run.time[-1]),
-        "seed": run.seed,
-        "recording": str(path),
-        "largest_joint_speed_rad_s": float(np.abs(run.theta_dot).max()),
-        "largest_spring_torque_nm": float(np.abs(run.tau_sea).max()),
-        "measurement_age_s": run.ages.measurement,
-        "command_age_s": run.ages.command,
-        "total_age_s": run.ages.total,
-        "energy_residual_j": float(np.abs(books.residual).max()),
-        "energy_throughput_j": float(books.throughput[-1]),
-        "joint_side_passive": joint.passive,
-        "controller_side_passive": central.passive if central else None,
-        "controller_side_slack_j": float(central.slack.min()) if central else None,
-        "first_violation_s": central.first_violation if central else None,
-        "violating_joint": central.joint if central else None,
-        "delay_side_passive": delay.passive if delay else None,
-        "delay_side_slack_j": float(delay.slack.min()) if delay else None,
-        "delay_injection_j": _largest(books.delay_injection),
-        "law_injection_j": _largest_magnitude(books.law_injection),
-        "injection_error_j": books.injection_error,
-        "delay_storage_j": _largest(books.delay_storage),
-        "delay_storage_error_j": books.delay_storage_error,
-        "tank_j": float(books.tank[-1]) if books.tank is not None else None,
-        "touchdowns": sum(event.kind.value == "touchdown" for event in run.events),
-    }
-
-
-def _largest(values: Array | None) -> float | None:
-    return None if values is None else float(values.max())
-
-
-def _largest_magnitude(values: Array | None) -> float | None:
-    """The value that is furthest from 0, with its sign."""
-    return None if values is None else float(values[np.abs(values).argmax()])
-
-
 def gait_summary(system: System, run: Run) -> dict[str, Any]:
     """Return how a walk compares with its plan.
 
@@ -164,7 +116,7 @@ def gait_summary(system: System, run: Run) -> dict[str, Any]:
     """
     walking = system.walking
     assert walking is not None
-    gait = measure_gait(system.robot, run, walking)
+    gait = MeasuredGait.of(system.robot, run, walking)
     return {
         "steps": gait.steps,
         "apex_speed_m_s": gait.apex_speed.tolist(),
@@ -201,9 +153,14 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
         )
     if books.tank is not None:
         print(f"{'energy tank':26} {books.tank[0]:.4f} J at first, {books.tank[-1]:.4f} J at last")
-    _show_side("joint side", books.joint_side)
-    _show_side("controller side", books.controller_side)
-    _show_side("delay and damping", books.delay_side)
+    sides = {
+        "joint side": books.joint_side,
+        "controller side": books.controller_side,
+        "delay and damping": books.delay_side,
+    }
+    for name, side in sides.items():
+        if side is not None:
+            print(f"{name:26} {side.verdict}")
     if "steps" in answer:
         speeds = ", ".join(f"{v:.2f}" for v in answer["apex_speed_m_s"])
         widths = ", ".join(f"{w:.2f}" for w in answer["step_width_m"])
@@ -211,15 +168,3 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
         print(f"{'apex speeds':26} {speeds} m/s")
         print(f"{'step widths':26} {widths} m")
     print(f"{'recording':26} {answer['recording']}")
-
-
-def _show_side(name: str, side: Passivity | None) -> None:
-    """What the passivity observer says about one side, if it can say anything."""
-    if side is None:
-        return
-    where = ""
-    if side.first_violation is not None:
-        where = (
-            f" by {-side.slack.min():.1e} J, first at {side.first_violation:.3f} s, {side.joint}"
-        )
-    print(f"{name:26} {'passive' if side.passive else 'not passive'}{where}")

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -32,6 +32,11 @@ class DelaySignal(Protocol):
     @property
     def mean(self) -> float:
         """Return the mean delay, s."""
+        ...
+
+    @property
+    def left_out(self) -> float:
+        """Return the share of packets that are later than the upper bound says."""
         ...
 
     def at(self, t: float | Array) -> Any:
@@ -79,6 +84,11 @@ class Constant:
     def mean(self) -> float:
         """The value itself, s."""
         return self.value
+
+    @property
+    def left_out(self) -> float:
+        """0: no packet is later."""
+        return 0.0
 
     def at(self, t: float | Array) -> float | Array:
         """Return the value, for each instant of t.
@@ -136,6 +146,11 @@ class Sinusoid:
         """Amplitude times angular frequency, s/s."""
         return self.amplitude * abs(self.angular_frequency)
 
+    @property
+    def left_out(self) -> float:
+        """0: no packet is later."""
+        return 0.0
+
     def at(self, t: float | Array) -> float | Array:
         """Return the delay.
 
@@ -174,6 +189,34 @@ class Table:
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "delay", delay)
 
+    @classmethod
+    def measured(cls, samples: ArrayLike, *, period: float, quantile: float = 1.0) -> Self:
+        """Make a delay signal from measured round-trip times.
+
+        Args:
+            samples: (N,) measured delays, s.
+            period: time between them, s.
+            quantile: samples above this quantile are cut to it; 1 keeps all. Below 1 the bound
+                covers only that share of the samples.
+
+        Returns:
+            The samples as a table that starts at 0.
+
+        Raises:
+            InputError: there are no samples, one cannot be a delay, or period or quantile is wrong.
+        """
+        values = np.asarray(samples, dtype=float)
+        if values.ndim != 1 or len(values) == 0:
+            raise InputError("Measured delays need at least one sample.")
+        if not (math.isfinite(period) and period > 0.0) or not 0.0 < quantile <= 1.0:
+            raise InputError("Measured delays need a positive period and a quantile in (0, 1].")
+        cut = float(np.quantile(values, quantile)) if quantile < 1.0 else np.inf
+        return cls(
+            time=np.arange(len(values)) * period,
+            delay=np.minimum(values, cut),
+            left_out=float(np.mean(values > cut)),
+        )
+
     @property
     def upper_bound(self) -> float:
         """The largest entry, s."""
@@ -206,45 +249,6 @@ class Table:
         """
         value = np.interp(t, self.time, self.delay)
         return float(value) if np.ndim(t) == 0 else value
-
-
-def measured(samples: ArrayLike, *, period: float, quantile: float = 1.0) -> Table:
-    """Make a delay signal from measured round-trip times.
-
-    Args:
-        samples: (N,) measured delays, s.
-        period: time between them, s.
-        quantile: samples above this quantile are cut to it; 1 keeps all. Below 1 the bound
-            covers only that share of the samples.
-
-    Returns:
-        The samples as a table that starts at 0.
-
-    Raises:
-        InputError: there are no samples, one cannot be a delay, or period or quantile is wrong.
-    """
-    values = np.asarray(samples, dtype=float)
-    if values.ndim != 1 or len(values) == 0:
-        raise InputError("Measured delays need at least one sample.")
-    if not (math.isfinite(period) and period > 0.0) or not 0.0 < quantile <= 1.0:
-        raise InputError("Measured delays need a positive period and a quantile in (0, 1].")
-    cut = float(np.quantile(values, quantile)) if quantile < 1.0 else np.inf
-    return Table(
-        time=np.arange(len(values)) * period,
-        delay=np.minimum(values, cut),
-        left_out=float(np.mean(values > cut)),
-    )
-
-
-def share_left_out(signal: DelaySignal) -> float:
-    """Return the share of packets that a delay signal leaves out of its upper bound.
-
-    Args:
-        signal: any delay signal; only measured ones cut at a quantile leave packets out.
-    """
-    if isinstance(signal, Share):
-        return share_left_out(signal.signal)
-    return signal.left_out if isinstance(signal, Table) else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -288,6 +292,11 @@ class Share:
     def mean(self) -> float:
         """The multiple of the signal's mean, s."""
         return self.fraction * self.signal.mean
+
+    @property
+    def left_out(self) -> float:
+        """The share that the signal leaves out."""
+        return self.signal.left_out
 
     def at(self, t: float | Array) -> Any:
         """Return the multiple of the delay.

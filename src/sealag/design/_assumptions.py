@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sealag.delay import share_left_out
 from sealag.design._local import Local
 from sealag.design._system import System
 from sealag.passivity import Assumption, Basis, Criterion
@@ -90,7 +89,7 @@ def _of_delays(system: System) -> Iterator[tuple[str, str]]:
     left_out = [
         f"{share:.1%} of the packets on the way {name}"
         for name, link in ways.items()
-        if (share := share_left_out(link.delay))
+        if (share := link.delay.left_out)
     ]
     if left_out:
         yield (

@@ -6,7 +6,6 @@ from importlib.metadata import version
 
 import numpy as np
 
-from sealag import __version__
 from sealag.design._assumptions import assumptions_of
 from sealag.design._criteria import (
     certified_bounds,
@@ -37,6 +36,7 @@ from sealag.passivity import (
 from sealag.robot import Motion
 from sealag.typing import Array
 from sealag.units import time_text
+from sealag.version import __version__
 from sealag.whole_body import Rest as Equilibrium
 from sealag.whole_body import Spaces, relative_asymmetry
 
@@ -122,7 +122,7 @@ def certify(
     Args:
         system: the design.
         motion: the motion; the system's posture if None.
-        criterion: certified (THEORY section 6) or published ((29), (31) as printed); the
+        criterion: certified (docs/theory section 6) or published ((29), (31) as printed); the
             system's own if None.
         time_varying: also bound the delay for matrices that move inside polytopes around the
             motion (about a second more); criterion certified only.

@@ -1,5 +1,5 @@
-"""The two criteria along a motion, certified (THEORY section 6) and published ((29), (31)), and the
-proofs of their bounds."""
+"""Bounds along a motion and their proofs, by the certified criterion (docs/theory section 6) and by
+the published one ((29), (31))."""
 
 from collections.abc import Iterator
 
@@ -34,7 +34,7 @@ rank."""
 def certified_bounds(
     spaces: Spaces, system: System, rest: Rest | None = None, motion: Motion | None = None
 ) -> Bound:
-    """Bound every instant by the criterion of THEORY section 6 for the law that is run.
+    """Bound every instant by the criterion of docs/theory section 6 for the law that is run.
 
     Sufficient for a passive controller side along the frozen motion: the signal is one that a
     potential can belong to, the drives are ideal, the motors carry the static load, no contact or
@@ -113,7 +113,7 @@ def _refusals(
 
 
 def _drive_refusals(system: System) -> Iterator[str]:
-    """Why drives that are late are covered by no passive bound (THEORY section 14)."""
+    """Why drives that are late are covered by no passive bound (docs/theory section 14)."""
     slow = np.flatnonzero(np.isfinite(system.actuators.torque_bandwidth))
     if len(slow):
         joint, rate = system.robot.joints[slow[0]], system.actuators.torque_bandwidth[slow[0]]

@@ -19,7 +19,6 @@ from sealag.delay import (
     RoundTrip,
     Sinusoid,
     Table,
-    measured,
 )
 from sealag.design._plain_words import first_problem
 from sealag.design._schema import AXES, Project, SamplesDelay
@@ -333,4 +332,6 @@ def _samples(section: Any, folder: Path) -> DelaySignal:
         values += [] if value is None else [value]
     if not values:
         raise ProjectError(f"{path} is empty; one delay in ms a line is needed.")
-    return measured(np.array(values) * 1e-3, period=section.period_s, quantile=section.quantile)
+    return Table.measured(
+        np.array(values) * 1e-3, period=section.period_s, quantile=section.quantile
+    )

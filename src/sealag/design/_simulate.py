@@ -14,17 +14,13 @@ from sealag.errors import InputError, either
 from sealag.robot import ContactKind
 from sealag.simulation import (
     Clock,
-    FallLimits,
     Foot,
     Network,
     Push,
     Run,
     Scene,
     closed_loop,
-    delay_store,
     fastest_link,
-    require_hold,
-    touching_posture,
 )
 from sealag.typing import Array
 from sealag.walking import GroundProfile, Walking, begin_walk
@@ -41,7 +37,6 @@ STEPS_PER_SWING = 8
 FINER = 4
 """How many times finer a step may become to divide the delays."""
 
-_FALL = FallLimits()
 _SPOT_SPEED = 1e-3  # m/s
 
 
@@ -102,17 +97,11 @@ def simulate(
         walking = walking if kind == "walk" else _on_the_spot(walking)
         return _walk(system, walking, _pushes(system, kind), common)
     feet = _feet(system)
-    scene = Scene(feet=feet, pushes=_pushes(system, kind), fall=_FALL)
+    scene = Scene(feet=feet, pushes=_pushes(system, kind))
     q = system.posture.copy()
     if system.robot.floating_base and system.contacts:
-        q = touching_posture(system.robot, q, feet, ground=scene.ground)
-        require_hold(
-            system.robot,
-            q,
-            feet,
-            ground=scene.ground,
-            torque_limit=system.actuators.torque_limit,
-        )
+        q = scene.touching_posture(system.robot, q)
+        scene.require_hold(system.robot, q, torque_limit=system.actuators.torque_limit)
     controller = _controller(system, kind, q)
     held, (q, theta) = q, _start(system, kind, q)
     run = closed_loop(
@@ -150,7 +139,7 @@ def _with_delay_storage(run: Run, system: System, q: Array) -> Run:
     if not 0.0 < delay < math.inf:
         return run
     (Y,) = bound.prove(0).blocks
-    stored, error = delay_store(run.time, run.theta, run.theta_dot, Y, delay=delay)
+    stored, error = run.delay_storage(Y, delay=delay)
     audit = replace(run.audit, delay_storage=stored, delay_storage_error=error)
     return replace(run, audit=audit)
 

@@ -1,7 +1,6 @@
 """Exact delay margin of a frozen closed loop with one constant delay."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -13,7 +12,6 @@ from sealag.margin._loop import (
     Loop,
     has_zero_root,
     prepare,
-    real_numbers,
     roots_at_once,
     time_of,
     undamped_whatever_the_delay,
@@ -96,7 +94,7 @@ def delay_margin(
     horizon: float | None = None,
     confirm: bool = False,
 ) -> DelayMargin:
-    """Exact margin of ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e) for constant d (THEORY section 7).
+    """Exact margin of ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e), constant d; docs/theory section 7.
 
     A root jω with z = e^{-jωd} solves det(jω − A_0 − z A_1 − A_e e^{-jωe}) = 0. Without A_e the
     eigenvalues of A_0 + e^{-jφ} A_1 are enclosed over half a turn φ; with it those of
@@ -151,57 +149,6 @@ def delay_margin(
     if confirm:
         _check(loop, answer)
     return answer
-
-
-def delay_margins(
-    A_0: ArrayLike,
-    A_1: ArrayLike,
-    *,
-    A_e: ArrayLike | None = None,
-    embedded_delay: float = 0.0,
-    symmetries: Sequence[ArrayLike] | ArrayLike | None = None,
-    at_most: ArrayLike | None = None,
-) -> tuple[DelayMargin, ...]:
-    """Compute the margins of many loops, one after the other.
-
-    Args:
-        A_0: (N, n, n) undelayed parts, 1/s.
-        A_1: (N, n, n) delayed parts, 1/s.
-        A_e: (N, n, n) parts with the fixed delay, 1/s; None for none.
-        embedded_delay: that delay e, s.
-        symmetries: None, or one (n, s) basis for each loop.
-        at_most: longest delay of interest, s, one or (N,): beyond it a margin is only said to be
-            longer (`delay` is inf and `searched_to` this delay); None for all delays.
-
-    Returns:
-        N margins.
-
-    Raises:
-        InputError: the lengths differ, or a loop cannot be used.
-        SolverError: a margin could not be found.
-    """
-    what = "an (N, n, n) array of real numbers"
-    first, second = (real_numbers(*pair, what=what) for pair in (("A_0", A_0), ("A_1", A_1)))
-    if first.ndim != 3 or first.shape != second.shape:
-        raise InputError(f"A_0 is {first.shape} and A_1 {second.shape}; (N, n, n) twice is needed.")
-    third = [None] * len(first) if A_e is None else real_numbers("A_e", A_e, what=what)
-    bases = [None] * len(first) if symmetries is None else list(symmetries)  # pyright: ignore
-    for name, given in (("A_e", third), ("symmetries", bases)):
-        if len(given) != len(first):
-            raise InputError(f"{name} is given for {len(given)} loops; there are {len(first)}.")
-    limits = [None] * len(first)
-    if at_most is not None:
-        times = real_numbers("at_most", at_most, what="one time in s, or one for each loop,")
-        if times.ndim and times.shape != (len(first),):
-            raise InputError(f"at_most has shape {times.shape}; there are {len(first)} loops.")
-        limits = np.broadcast_to(times, len(first)).tolist()
-    return tuple(
-        delay_margin(
-            first[k], second[k], A_e=third[k], embedded_delay=embedded_delay,
-            symmetries=bases[k], at_most=limits[k],
-        )
-        for k in range(len(first))
-    )  # fmt: skip
 
 
 def _margin(loop: Loop, *, longest: float) -> DelayMargin:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.margin._loop import Loop, prepare, time_of
+from sealag.margin._loop import EPS, Loop, prepare, time_of
 from sealag.typing import Array, ArrayLike
 
 _MOST_NODES = 120
@@ -23,9 +23,9 @@ def rightmost_roots(
     """Rightmost roots of det(λ − A_0 − A_1 e^{-λd} − A_e e^{-λe}) = 0.
 
     The generator of the solution semigroup is discretised on Chebyshev nodes over the longer delay,
-    in two pieces where there are two delays (Breda, Maset & Vermiglio), and every root refined by
-    Newton's method on the characteristic equation. Independent of `delay_margin`; a heuristic where
-    `nodes` resolve too little.
+    in two pieces where there are two delays (Breda, Maset & Vermiglio), for the signals that act
+    late only. Every root is refined by Newton's method on the characteristic equation. Independent
+    of `delay_margin`; a heuristic where `nodes` resolve too little.
 
     Args:
         A_0: (n, n) undelayed part, 1/s.
@@ -91,17 +91,30 @@ def _collocated(loop: Loop, delay: float, *, count: int, nodes: int) -> Array:
     for piece, (start, end) in enumerate(zip(starts, ages, strict=True)):
         at = slice(piece * nodes, (piece + 1) * nodes + 1)
         D[at, at][1:] = 2.0 / (end - start) * _differentiation(nodes)[1:]
-    generator = np.kron(D, np.eye(n))
-    generator[:n] = 0.0
-    row = {0.0: 0, **{age: (piece + 1) * nodes for piece, age in enumerate(ages)}}
-    for part, age in ((loop.A_0, 0.0), (loop.A_1, delay), (loop.A_e, loop.embedded_delay)):
-        at = row.get(age, 0)
-        generator[:n, at * n : (at + 1) * n] += part
+    signals = _late_signals(loop)
+    k = len(signals)
+    past = slice(n, n + k * (len(D) - 1))
+    generator = np.zeros((past.stop, past.stop))
+    generator[:n, :n] = loop.A_0
+    generator[past, :n] = np.kron(D[1:, :1], signals)
+    generator[past, past] = np.kron(D[1:, 1:], np.eye(k))
+    for part, age in ((loop.A_1, delay), (loop.A_e, loop.embedded_delay)):
+        if age in ages:
+            last = n + k * (ages.index(age) + 1) * nodes
+            generator[:n, last - k : last] += part @ signals.T
+        else:
+            generator[:n, :n] += part
     values = np.linalg.eigvals(generator)
     values = values[np.argsort(-values.real)][: 2 * count + 4]
     refined = np.array([_newton(loop, delay, value) for value in values])
     order = np.argsort(-refined.real, kind="stable")
     return refined[order][:count]
+
+
+def _late_signals(loop: Loop) -> Array:
+    """(k, n) orthonormal rows E with A_1 = A_1 Eᵀ E and A_e = A_e Eᵀ E: what is felt late."""
+    _, sizes, rows = np.linalg.svd(np.vstack([loop.C, loop.A_e]))
+    return rows[: int((sizes > EPS * sizes[0]).sum())]
 
 
 def _differentiation(N: int) -> Array:

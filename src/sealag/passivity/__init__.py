@@ -1,8 +1,8 @@
 """Passivity criteria: how much delay a design tolerates, and the proof of it.
 
-`solve` answers a `Problem` with a `Bound`, for a multiplier that each `Instant`, a whole `Motion` or
-all of some `Windows` share. A `Certificate` is question, answer and evidence; `verify` checks it
-from its own numbers, without the code that made it.
+`solve` answers a `Problem` with a `Bound`, for a multiplier that each `Instant`, a whole `Motion`
+or polytopes in `Windows` share. A `Certificate` is question, answer and evidence; `verify` checks
+it from its own numbers, without the code that made it.
 """
 
 from sealag.passivity._bound import Bound

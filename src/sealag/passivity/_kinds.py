@@ -13,7 +13,7 @@ class Status(StrEnum):
 class Criterion(StrEnum):
     """Which criterion was used.
 
-    published: (29), (31) as printed. certified: THEORY section 6, for the law that is run.
+    published: (29), (31) as printed. certified: docs/theory section 6, for the law that is run.
     """
 
     PUBLISHED = "published"

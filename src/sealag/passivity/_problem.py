@@ -5,7 +5,7 @@ The inequality of Theorem 1 and Corollary 1, scaled by D_θ^-½, is for instant 
     [[2I − J_tᵀ W J_t, d M_t], [⋆, W]] ⪰ 0,   W = d Q = diag(W_1 … W_k) ≻ 0,
 
 with J = J* D^-½ and M = D^-½ J*ᵀ S. Priority levels are the blocks of W. The certified criterion is
-J* = I and M = D^-½ F, with one multiplier in joint coordinates (THEORY section 6).
+J* = I and M = D^-½ F, with one multiplier in joint coordinates (docs/theory section 6).
 """
 
 from collections.abc import Sequence

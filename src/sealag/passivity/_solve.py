@@ -75,9 +75,9 @@ def max_delay(
     """Largest delay of Theorem 1 (29), d = 1 / w(D^-½ J*ᵀ S J* D^-½), in closed form.
 
     w is the numerical radius; the value is the supremum over all multipliers Q ≻ 0, for any m, n
-    and rank of J* (Ando's theorem; THEORY section 5). With `form="published"`, S = Λ K_x and this
-    is the criterion as printed; it is sufficient for a passive loop only where S is symmetric
-    and x(θ) is what is fed back (THEORY section 6).
+    and rank of J* (Ando's theorem; docs/theory section 5). With `form="published"`, S = Λ K_x and
+    this is the criterion as printed; it is sufficient for a passive loop only where S is symmetric
+    and x(θ) is what is fed back (docs/theory section 6).
 
     Args:
         J_star: (…, m, n) contact-consistent Jacobian J*.

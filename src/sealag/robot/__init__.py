@@ -2,30 +2,22 @@
 
 from sealag.robot._contact import Contact, ContactKind, Motion
 from sealag.robot._limits import UNIT_TOLERANCE, require_within_limits
-from sealag.robot._load import bundled_robot_path, example_robot_path, resolve_urdf
+from sealag.robot._load import resolve_urdf
 from sealag.robot._load_robot import load_robot
-from sealag.robot._mimic import Follower
 from sealag.robot._reference import ReferencePosture, reference_posture
 from sealag.robot._robot import Robot
-from sealag.robot._stack import Stack, TermRows, stack_terms
 from sealag.robot._workspace import Workspace
 
 __all__ = [
     "UNIT_TOLERANCE",
     "Contact",
     "ContactKind",
-    "Follower",
     "Motion",
     "ReferencePosture",
     "Robot",
-    "Stack",
-    "TermRows",
     "Workspace",
-    "bundled_robot_path",
-    "example_robot_path",
     "load_robot",
     "reference_posture",
     "require_within_limits",
     "resolve_urdf",
-    "stack_terms",
 ]

@@ -48,6 +48,16 @@ class Passivity:
     joint: str | None
     tolerance: float
 
+    @property
+    def verdict(self) -> str:
+        """Whether the side was passive; if not, by how much, from when on, and which joint."""
+        if self.first_violation is None:
+            return "passive"
+        return (
+            f"not passive by {-self.slack.min():.1e} J, first at {self.first_violation:.3f} s, "
+            f"{self.joint}"
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Audit:

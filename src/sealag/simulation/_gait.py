@@ -1,6 +1,7 @@
 """Footholds, apexes and step widths of a simulated walk, against its plan."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -53,6 +54,44 @@ class MeasuredGait:
     step_width: Array
     com: Array
 
+    @classmethod
+    def of(cls, robot: Robot, run: Run, walking: Walking) -> Self:
+        """Find footholds, apexes and step widths in a run.
+
+        A foothold is where the foot that was in the air touches down. An apex is where the CoM
+        passes over the foot that touched down last.
+
+        Args:
+            robot: The robot that walked.
+            run: The simulation.
+            walking: What was asked for.
+        """
+        at = robot.workspace()
+        com = np.array([at.center_of_mass(q) for q in run.q])
+        times, sides = _footholds(run, walking)
+        index = np.minimum(np.searchsorted(run.time, times), len(run.time) - 1)
+        place = np.array(
+            [robot.frame_placement(walking.feet[f], run.q[i])[1] for i, f in zip(index, sides)]
+        )
+        lateral = np.array([side.lateral for side in sides[1:]])
+        stood = np.searchsorted(np.array(times), run.time, side="right") - 1
+        ahead = com[:, 0] - place[stood, 0]
+        same = stood[1:] == stood[:-1]
+        apex = np.flatnonzero(same & (ahead[:-1] <= 0.0) & (ahead[1:] > 0.0))
+        return cls(
+            walking=walking,
+            outcome=run.outcome,
+            message=run.message,
+            touchdown=np.array(times),
+            foot=np.array(sides, dtype=np.int64),
+            place=place,
+            apex_time=run.time[apex],
+            apex_speed=np.array([_forward_speed(at, run.q[i], run.v[i]) for i in apex]),
+            apex_step=stood[apex],
+            step_width=lateral * np.diff(place[:, 1]),
+            com=com,
+        )
+
     @property
     def steps(self) -> int:
         """Number of steps taken."""
@@ -97,44 +136,6 @@ class MeasuredGait:
         if self.outcome is Outcome.COMPLETED:
             return f"only {self.steps} steps in time"
         return f"{self.outcome.value} after {self.steps} steps: {self.message}"
-
-
-def measure_gait(robot: Robot, run: Run, walking: Walking) -> MeasuredGait:
-    """Find footholds, apexes and step widths in a run.
-
-    A foothold is where the foot that was in the air touches down. An apex is where the CoM passes
-    over the foot that touched down last.
-
-    Args:
-        robot: The robot that walked.
-        run: The simulation.
-        walking: What was asked for.
-    """
-    at = robot.workspace()
-    com = np.array([at.center_of_mass(q) for q in run.q])
-    times, sides = _footholds(run, walking)
-    index = np.minimum(np.searchsorted(run.time, times), len(run.time) - 1)
-    place = np.array(
-        [robot.frame_placement(walking.feet[f], run.q[i])[1] for i, f in zip(index, sides)]
-    )
-    lateral = np.array([side.lateral for side in sides[1:]])
-    stood = np.searchsorted(np.array(times), run.time, side="right") - 1
-    ahead = com[:, 0] - place[stood, 0]
-    same = stood[1:] == stood[:-1]
-    apex = np.flatnonzero(same & (ahead[:-1] <= 0.0) & (ahead[1:] > 0.0))
-    return MeasuredGait(
-        walking=walking,
-        outcome=run.outcome,
-        message=run.message,
-        touchdown=np.array(times),
-        foot=np.array(sides, dtype=np.int64),
-        place=place,
-        apex_time=run.time[apex],
-        apex_speed=np.array([_forward_speed(at, run.q[i], run.v[i]) for i in apex]),
-        apex_step=stood[apex],
-        step_width=lateral * np.diff(place[:, 1]),
-        com=com,
-    )
 
 
 def _footholds(run: Run, walking: Walking) -> tuple[list[float], list[Side]]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from sealag.errors import InputError
 from sealag.simulation._audit import Audit
+from sealag.simulation._delay_store import delay_store
 from sealag.simulation._exchange import Ages
 from sealag.simulation._outcome import Outcome
 from sealag.simulation._plant import ContactEvent
@@ -63,6 +64,18 @@ class Run:
     contact_force: Array
     events: tuple[ContactEvent, ...]
     audit: Audit
+
+    def delay_storage(self, Y: Array, *, delay: float) -> tuple[Array, float]:
+        """Return V_4, the energy that a delay stores, at the logged instants, and its error, J.
+
+        Args:
+            Y: The multiplier (n, n) of the certificate, Nms²/rad.
+            delay: d, s, positive.
+
+        Returns:
+            V_4 (N,) and a bound of its error.
+        """
+        return delay_store(self.time, self.theta, self.theta_dot, Y, delay=delay)
 
 
 class Log:

@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from sealag.errors import InputError
-from sealag.robot import Contact, ContactKind
+from sealag.robot import Contact, ContactKind, Robot
 from sealag.simulation._ground import Foot
+from sealag.simulation._hold import Hold, require_hold, touching_posture
+from sealag.typing import Array
 from sealag.walking import Ground, GroundProfile, Walking
 
 
@@ -70,6 +72,32 @@ class Scene:
     pushes: Sequence[Push] = ()
     fall: FallLimits | None = field(default_factory=FallLimits)
     stabilisation: float = 50.0
+
+    def touching_posture(self, robot: Robot, q: Array) -> Array:
+        """Return the nearest posture in which every contact point touches the ground.
+
+        Args:
+            robot: The robot.
+            q: Configuration (nq,).
+
+        Raises:
+            InputError: A point is more than 10 mm from the ground when another one touches, or no
+                posture nearby lets all of them touch.
+        """
+        return touching_posture(robot, q, self.feet, ground=self.ground)
+
+    def require_hold(self, robot: Robot, q: Array, *, torque_limit: Array) -> Hold:
+        """Return the contact forces and torques that hold a posture against gravity.
+
+        Args:
+            robot: The robot.
+            q: Configuration (nq,).
+            torque_limit: Limits (n,), Nm; inf for none.
+
+        Raises:
+            InputError: No foot touches, or the torque limits cannot hold the robot.
+        """
+        return require_hold(robot, q, self.feet, ground=self.ground, torque_limit=torque_limit)
 
     @classmethod
     def of_walk(cls, walking: Walking, pushes: Sequence[Push] = ()) -> Self:

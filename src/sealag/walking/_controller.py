@@ -1,4 +1,4 @@
-"""Walking with springs and delay: whole-body law, weight transfer, steps, all at one tick."""
+"""The walking controller: whole-body law, weight transfer, steps and command at each tick."""
 
 import math
 from dataclasses import dataclass
@@ -181,7 +181,7 @@ class WalkingController:
             self._estimator.tau_sea[:] = measurement.tau_sea
 
     def _switch(self, now: float, contact: Array) -> None:
-        """Begin the next step when planned, or when the swing foot is seen on the ground."""
+        """Begin the next step as planned, or at an early touchdown of the swing foot."""
         step, gait = self.step, self.gait
         late = step.phase(now) > _LATE_SWING * gait.step_time + 0.4 * gait.transfer_time
         touched = self.options.early_contact and late and contact[step.swing_foot] > 0.0
@@ -203,7 +203,7 @@ class WalkingController:
 
 
 def _gains(options: WalkingOptions, period: float) -> tuple[Array, Array]:
-    """Return the numbers that the kernels of law and command take."""
+    """Return gains as the kernels of law and command take them."""
     stiffness = [options.height_stiffness, options.posture_stiffness, options.swing_stiffness]
     damping = [2.0 * options.task_damping * math.sqrt(k) for k in stiffness]
     planned = 1.0 if options.acceleration_feedforward else 0.0

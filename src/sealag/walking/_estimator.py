@@ -1,4 +1,4 @@
-"""What the walking controller knows of the robot's state: body terms, odometry, prediction."""
+"""State estimation of the walking controller: body terms, leg odometry, prediction."""
 
 import numpy as np
 
@@ -87,17 +87,17 @@ class Estimator:
         self.tau_sea = np.zeros(robot.n)
 
     def reset(self, feet: Array, stance: int) -> None:
-        """Begin with both feet (2, 3) m at known places, and no command sent.
+        """Begin with both feet at known positions, and no command in flight.
 
         Args:
-            feet: Where they are, m.
+            feet: Their positions (2, 3), m.
             stance: Foot stood on.
         """
         self._anchor[:], self._stance = feet, stance
         self._ring[0][:], self._newest, self._any = -np.inf, 0, False
 
     def sent(self, command: Array, arrival: float) -> None:
-        """Remember a command.
+        """Add a command to those in flight.
 
         Args:
             command: (n,) Nm.
@@ -113,7 +113,7 @@ class Estimator:
         self, body: Body, step: StepReferences, *, theta: Array, theta_dot: Array,
         measured: float, now: float,
     ) -> None:  # fmt: skip
-        """Move the body's q and v from the measurement's to what they are ``now``; evaluate there.
+        """Predict the body's q and v from the measurement to ``now``, and evaluate its terms there.
 
         Args:
             body: The robot.
@@ -139,7 +139,7 @@ class Estimator:
         )  # fmt: skip
 
     def _step_over(self, body: Body, step: StepReferences, t: float) -> None:
-        """Stand on the new foot once it carries half of the weight."""
+        """Anchor the odometry at the new foot once it carries half of the weight."""
         old, new = self._stance, step.stance
         if new != old and step.phase(t) >= 0.5 * step.transfer_time:
             body.update()

@@ -1,4 +1,4 @@
-"""Where the next foot must land, from the predicted end of the step."""
+"""Foot placement by the predicted capture point at the end of the step."""
 
 import math
 

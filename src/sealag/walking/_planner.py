@@ -1,4 +1,4 @@
-"""Phase-space planning of a walk over rough terrain (THEORY section 11).
+"""Phase-space planning of a walk over rough terrain (docs/theory section 11).
 
 Zhao, Sentis, Humanoids 2012; Zhao, Fernandez, Sentis, IJRR 2017.
 """

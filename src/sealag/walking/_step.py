@@ -120,14 +120,14 @@ class StepReferences:
         return min(self.phase(t), self._gait.step_time) - self.offset
 
     def lift(self, foot: Array) -> None:
-        """Begin the swing where the foot is (3,), m."""
+        """Begin the swing at the foot's position (3,), m."""
         self.swing[0], self.swing[1:] = foot, 0.0
         self._lift = float(foot[2])
         self.swinging = True
         self._clear()
 
     def _clear(self) -> None:
-        """Raise the swing so that it clears the ground between both footholds."""
+        """Raise the swing so that it clears the ground between the footholds."""
         start, end = self.old, self.target
         excess = 0.0
         for u in (0.2, 0.35, 0.5, 0.65, 0.8):

@@ -4,9 +4,10 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 from sealag.errors import InputError, word
-from sealag.robot import Robot, TermRows
+from sealag.robot import Robot
 from sealag.typing import Array
 from sealag.whole_body._signals import MotorAngles, Signal
+from sealag.whole_body._stack import TermRows
 from sealag.whole_body._tasks import (
     GravityCompensation,
     StiffnessForm,

@@ -9,10 +9,11 @@ import numpy as np
 
 from sealag.actuation import Actuators
 from sealag.errors import RobotError
-from sealag.robot import Contact, Motion, Robot, Stack, stack_terms
+from sealag.robot import Contact, Motion, Robot
 from sealag.typing import Array, BoolArray
 from sealag.whole_body._law import Law
 from sealag.whole_body._signals import static_contraction
+from sealag.whole_body._stack import Stack, stack_terms
 from sealag.whole_body._tasks import (
     FORM_CODE,
     RANK_TOLERANCE,

@@ -7,8 +7,9 @@ from enum import StrEnum
 import numpy as np
 
 from sealag.errors import InputError, either, word
-from sealag.robot import Robot, TermRows
+from sealag.robot import Robot
 from sealag.typing import Array, ArrayLike
+from sealag.whole_body._stack import TermRows
 
 
 class TaskKind(StrEnum):

@@ -38,11 +38,7 @@ def controller_of(system, q: np.ndarray, contacts=None):
     """
     contacts = system.contacts if contacts is None else contacts
     system = replace(system, posture=q, contacts=contacts)
-    if hasattr(system, "controller"):
-        return system.controller()
-    from sealag.design._simulate import _controller
-
-    return _controller(system, "regulate", q)
+    return system.controller()
 
 
 class Law:

@@ -235,7 +235,10 @@ def _spectrum(A: np.ndarray, turned: np.ndarray, phi: float) -> tuple[np.ndarray
     """
     late = np.exp(-1j * phi) * turned
     values, V = np.linalg.eig(A + late)
-    moved = np.linalg.pinv(V) @ (-1j * late @ V)
+    try:
+        moved = np.linalg.solve(V, -1j * late @ V)
+    except np.linalg.LinAlgError:
+        moved = np.linalg.pinv(V) @ (-1j * late @ V)
     rates = np.diag(moved).copy()
     order = np.argsort(values.real)
     values, rates, moved = values[order], rates[order], moved[np.ix_(order, order)]

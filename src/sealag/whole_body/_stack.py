@@ -6,9 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.robot._contact import Contact
-from sealag.robot._robot import Robot
-from sealag.robot._workspace import Workspace
+from sealag.robot import Contact, Robot, Workspace
 from sealag.typing import Array, ArrayLike
 
 
