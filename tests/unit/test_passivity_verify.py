@@ -16,8 +16,8 @@ from sealag.passivity import Criterion, read_certificate, verify, write_certific
 
 SEED = 20261124
 CHECKERS = (
-    "verify", "certificate", "layout", "kinds", "checks", "claims", "definite", "proofs",
-    "supremum", "local", "axis",
+    "verify", "certificate", "stated", "statement", "layout", "kinds", "checks", "claims",
+    "definite", "proofs", "shared", "supremum", "local", "axis",
 )  # fmt: skip
 
 

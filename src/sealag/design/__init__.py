@@ -1,7 +1,7 @@
 """The user's project file, motions in and out, and the certificate of a design."""
 
 from sealag.design._certify import certify, check_question
-from sealag.design._criteria import certified_bounds, published_bounds
+from sealag.design._criteria import certified_bounds
 from sealag.design._local import local_of, margin_of
 from sealag.design._margins import local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
@@ -23,7 +23,6 @@ __all__ = [
     "margin_of",
     "motion_table",
     "parse_project",
-    "published_bounds",
     "resolve_project",
     "save_motion",
     "scenario_duration",

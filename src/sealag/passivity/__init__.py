@@ -6,17 +6,7 @@ it from its own numbers, without the code that made it.
 """
 
 from sealag.passivity._bound import Bound
-from sealag.passivity._certificate import (
-    Answer,
-    Assumption,
-    Certificate,
-    Critical,
-    Evidence,
-    Question,
-    Rest,
-    Worst,
-    write_certificate,
-)
+from sealag.passivity._certificate import Certificate, write_certificate
 from sealag.passivity._checks import Check, Verification
 from sealag.passivity._kinds import Basis, Criterion, Place, Status
 from sealag.passivity._local import LocalLoop
@@ -24,6 +14,8 @@ from sealag.passivity._problem import Problem
 from sealag.passivity._proofs import InstantProof, Window
 from sealag.passivity._solve import Instant, Motion, max_delay, solve
 from sealag.passivity._solvers import ClarabelCvxpy, ClarabelDirect, Solution, Solver
+from sealag.passivity._stated import Evidence
+from sealag.passivity._statement import Answer, Assumption, Critical, Question, Rest, Worst
 from sealag.passivity._verify import read_certificate, verify
 from sealag.passivity._windows import Windows
 

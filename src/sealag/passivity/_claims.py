@@ -3,17 +3,14 @@
 import math
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sealag.passivity._checks import Check
 from sealag.passivity._kinds import Basis, Criterion, Status
 from sealag.passivity._proofs import AGREEMENT, SYMMETRY, asymmetry
+from sealag.passivity._stated import Stated
 from sealag.units import time_text
-
-if TYPE_CHECKING:
-    from sealag.passivity._certificate import Certificate
 
 _FEEDBACK = ("motor", "static_joint", "static_joint_tank", "joint")
 _GRAVITY = ("feedback", "planned", "none")
@@ -33,7 +30,7 @@ _KEY = re.compile(r"[a-z][a-z0-9_]{0,59}")
 _VERSION = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+_-]{0,59}")
 
 
-def claim_checks(c: "Certificate") -> Iterator[Check]:
+def claim_checks(c: Stated) -> Iterator[Check]:
     """Check instants, smallest bound, verdict, and what else the file says of the motion.
 
     Args:
@@ -44,6 +41,8 @@ def claim_checks(c: "Certificate") -> Iterator[Check]:
     yield from _bound_checks(c)
     yield _shared(c)
     yield from _margin_checks(c)
+    if c.evidence.local_loop is None:
+        yield _no_loop(c)
     yield _verdict(c)
     yield _published(c)
     yield _conservatism(c)
@@ -52,7 +51,7 @@ def claim_checks(c: "Certificate") -> Iterator[Check]:
     yield _asymmetry(c)
 
 
-def _label_checks(c: "Certificate") -> Iterator[Check]:
+def _label_checks(c: Stated) -> Iterator[Check]:
     """Words, digests, versions and keys are of the kinds that a certificate has."""
     question, answer = c.question, c.answer
     known = question.feedback in _FEEDBACK and question.gravity in _GRAVITY
@@ -79,7 +78,7 @@ def _label_checks(c: "Certificate") -> Iterator[Check]:
     yield Check(name="bounds left open", ok=open_, detail=words)
 
 
-def _bounds_asked(c: "Certificate") -> dict[str, float | None]:
+def _bounds_asked(c: Stated) -> dict[str, float | None]:
     """Bounds that a solver may leave open, by their names in the file."""
     return {
         "max_delay_s": c.answer.max_delay_s,
@@ -88,7 +87,7 @@ def _bounds_asked(c: "Certificate") -> dict[str, float | None]:
     }
 
 
-def _drives(c: "Certificate") -> Check:
+def _drives(c: Stated) -> Check:
     q = c.question
     drives = np.array([w for w in q.torque_bandwidth if w is not None])
     positive = (q.D_theta, q.spring_stiffness, q.motor_inertia, q.rotor_inertia, drives)
@@ -98,7 +97,7 @@ def _drives(c: "Certificate") -> Check:
     return Check(name="damping, springs and drives", ok=good, detail=words)
 
 
-def _bound_checks(c: "Certificate") -> Iterator[Check]:
+def _bound_checks(c: Stated) -> Iterator[Check]:
     answer, evidence = c.answer, c.evidence
     times, smallest = evidence.time_s, min(evidence.bounds_s)
     proven = [proof.instant for proof in evidence.proofs]
@@ -125,7 +124,7 @@ def _bound_checks(c: "Certificate") -> Iterator[Check]:
     )
 
 
-def _shared(c: "Certificate") -> Check:
+def _shared(c: Stated) -> Check:
     """One multiplier for many instants proves no longer delay than each instant's own."""
     both = (c.answer.common_multiplier_delay_s, c.answer.time_varying_delay_s)
     known, smallest = [delay for delay in both if delay is not None], min(c.evidence.bounds_s)
@@ -138,7 +137,7 @@ def _shared(c: "Certificate") -> Check:
     )
 
 
-def _margin_checks(c: "Certificate") -> Iterator[Check]:
+def _margin_checks(c: Stated) -> Iterator[Check]:
     """What is said of all instants follows from what is said of each."""
     answer, evidence = c.answer, c.evidence
     basis, margins = evidence.instant_basis, evidence.instant_margins_s
@@ -175,7 +174,7 @@ def _margin_checks(c: "Certificate") -> Iterator[Check]:
     )
 
 
-def _inexact_margins(c: "Certificate", floor: float) -> Check:
+def _inexact_margins(c: Stated, floor: float) -> Check:
     """Instants decided by their bound have it as margin; no instant lies below the smallest."""
     evidence, loop = c.evidence, c.evidence.local_loop
     basis, margins = evidence.instant_basis, evidence.instant_margins_s
@@ -196,7 +195,18 @@ def _inexact_margins(c: "Certificate", floor: float) -> Check:
     )
 
 
-def _verdict(c: "Certificate") -> Check:
+def _no_loop(c: Stated) -> Check:
+    """Nothing is claimed of a loop that is not in the file."""
+    answer, at = c.answer, c.answer.critical.instant
+    rests = answer.equilibrium is not None and answer.equilibrium.found
+    none = c.evidence.instant_margins_s[at] == 0.0 and not rests
+    known = c.evidence.instant_basis[at] is not Basis.OPEN and not none
+    ok = not known and answer.unstable_modes == 0 and answer.first_crossing_s is None
+    words = "no frozen loop is in the file, and nothing is claimed of it"
+    return Check(name="frozen loop", ok=ok, detail=words)
+
+
+def _verdict(c: Stated) -> Check:
     """Status, reasons and delays agree; a bound of 0 is where a condition of the criterion fails.
 
     A bound over the whole motion that a solver left open below the design's delay decides nothing,
@@ -226,7 +236,7 @@ def _verdict(c: "Certificate") -> Check:
     )
 
 
-def _published(c: "Certificate") -> Check:
+def _published(c: Stated) -> Check:
     claimed = c.answer.published_max_delay_s
     if c.question.criterion is Criterion.PUBLISHED:
         same, detail = claimed == c.answer.max_delay_s, "it is this certificate's bound"
@@ -236,7 +246,7 @@ def _published(c: "Certificate") -> Check:
     return Check(name="published bound", ok=same, detail=detail)
 
 
-def _conservatism(c: "Certificate") -> Check:
+def _conservatism(c: Stated) -> Check:
     """Margin over bound; at least 1 where a design is certified."""
     ratio, margin, largest = (
         c.answer.conservatism,
@@ -253,7 +263,7 @@ def _conservatism(c: "Certificate") -> Check:
     )
 
 
-def _unbounded(c: "Certificate") -> Check:
+def _unbounded(c: Stated) -> Check:
     """The bound is infinite only if F = 0."""
     if c.answer.max_delay_s < math.inf:
         return Check(name="unbounded delay", ok=True, detail="none is claimed")
@@ -270,7 +280,7 @@ def _shown(claimed: float, shown: float, *, complete: bool) -> bool:
 
 
 def _largest(
-    name: str, claimed: float | None, shown: list[float], *, c: "Certificate", limit: float | None
+    name: str, claimed: float | None, shown: list[float], *, c: Stated, limit: float | None
 ) -> Check:
     """A largest value over the motion against those of the proofs, and against its limit."""
     most = max(shown, default=0.0)
@@ -283,14 +293,14 @@ def _largest(
     return Check(name=name, ok=ok, detail=detail)
 
 
-def _asymmetry(c: "Certificate") -> Check:
+def _asymmetry(c: Stated) -> Check:
     proven = c.question.criterion is Criterion.CERTIFIED and c.answer.max_delay_s > 0.0
     shown = [asymmetry(proof.F) for proof in c.evidence.proofs]
     limit = SYMMETRY if proven else None
     return _largest("asymmetry", c.answer.asymmetry, shown, c=c, limit=limit)
 
 
-def _contraction(c: "Certificate") -> Check:
+def _contraction(c: Stated) -> Check:
     """‖K^-½ F_q K^-½‖₂ with F_q = J*ᵀ S J* less the gravity gradient."""
     question, claimed, K = c.question, c.answer.contraction, c.question.spring_stiffness
     if question.criterion is not Criterion.CERTIFIED:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
@@ -15,13 +15,11 @@ from sealag.passivity._axis import (
     unstable_roots,
 )
 from sealag.passivity._checks import Check
-from sealag.passivity._kinds import Basis, Criterion, Place
-from sealag.passivity._proofs import AGREEMENT
+from sealag.passivity._kinds import Criterion, Place
+from sealag.passivity._proofs import AGREEMENT, InstantProof
+from sealag.passivity._statement import Answer, Question
 from sealag.typing import Array
 from sealag.units import time_text
-
-if TYPE_CHECKING:
-    from sealag.passivity._certificate import Certificate, Question
 
 COUPLED = 1e-6
 """Share of A_1 from which an entry that the motor angles do not multiply counts. Ten times less
@@ -81,7 +79,7 @@ class LocalLoop:
         """Largest entry of A_1 over the largest of A_0."""
         return float(np.abs(self.A_1).max(initial=0.0)) / _size(self.A_0)
 
-    def coupled(self, question: "Question") -> bool:
+    def coupled(self, question: Question) -> bool:
         """Tell whether the law answers to motions that the motors do not determine.
 
         Args:
@@ -92,31 +90,40 @@ class LocalLoop:
         aside = float(np.abs(self.A_1[:, others]).max(initial=0.0))
         return question.feedback != "joint" and aside > COUPLED * _size(self.A_1)
 
-    def checks(self, c: "Certificate") -> Iterator[Check]:
+    def checks(
+        self,
+        question: Question,
+        answer: Answer,
+        *,
+        margin_s: float | None,
+        proof: InstantProof | None,
+    ) -> Iterator[Check]:
         """Check the loop's structure, its margin, first crossing and unstable modes.
 
         Args:
-            c: the certificate that this loop is part of.
+            question: of the certificate that this loop is part of.
+            answer: of the same.
+            margin_s: the margin that is claimed for the loop's instant, s.
+            proof: of the loop's instant, if there is one.
         """
-        yield from self._structure_checks(c)
+        yield from self._structure_checks(question, proof)
         yield self._symmetry_check()
         reduced = self._reduced()
-        yield _unstable(c, reduced)
-        yield self._margin_check(c)
-        crossing = c.answer.first_crossing_s
+        yield _unstable(answer.unstable_modes, reduced)
+        yield self._margin_check(margin_s, answer.first_crossing_s)
+        crossing = answer.first_crossing_s
         if crossing is None:
             return
         omega = self.frequency_rad_s
         if omega is not None and crossing < math.inf:
             yield _on_axis(reduced, delay=crossing, omega=omega)
-        if c.answer.unstable_modes == 0 and reduced.A_e is None:
+        if answer.unstable_modes == 0 and reduced.A_e is None:
             yield _swept(reduced, crossing)
         else:
-            yield _counted(reduced, crossing, omega=omega, before=c.answer.unstable_modes)
+            yield _counted(reduced, crossing, omega=omega, before=answer.unstable_modes)
 
-    def _structure_checks(self, c: "Certificate") -> Iterator[Check]:
+    def _structure_checks(self, question: Question, proof: InstantProof | None) -> Iterator[Check]:
         """Names of states, rates of positions, and the motors' rows as the design has them."""
-        question = c.question
         joints = [f"theta:{name}" for name in question.joints]
         drives, tank = (
             [name for name in self.states if name.startswith(kind)] for kind in ("drive:", "tank:")
@@ -141,9 +148,9 @@ class LocalLoop:
         same = (self.A_0[:half] == unit).all() and not any(A[:half].any() for A in self.parts[1:])
         words = "each position changes by its rate"
         yield Check(name="frozen loop: positions", ok=bool(same), detail=words)
-        yield self._motor_check(c, free=free)
+        yield self._motor_check(question, proof, free=free)
 
-    def _motor_check(self, c: "Certificate", *, free: int) -> Check:
+    def _motor_check(self, question: Question, proof: InstantProof | None, *, free: int) -> Check:
         """Rows of motors and drives, entry by entry as far as the file knows them.
 
         B θ̈ = τ − τ_sea − viscous θ̇ with τ_sea = K (θ − q) + D_s (θ̇ − q̇), where the torque is
@@ -151,7 +158,7 @@ class LocalLoop:
         by τ̇_m = ω (τ − τ_m). A_e holds the τ_sea of τ where torque feedback is late, A_1 holds
         τ_osc.
         """
-        question, n, size = c.question, len(c.question.joints), len(self.states)
+        n, size = len(question.joints), len(self.states)
         slow = np.array([w is not None for w in question.torque_bandwidth])
         speed = np.array([w for w in question.torque_bandwidth if w is not None])
         angle = np.arange(free, free + n)
@@ -184,12 +191,18 @@ class LocalLoop:
         takes, gain = rate.copy(), r / B
         takes[slow], gain[slow] = drive, speed * r[slow]
         gaps.append(float(np.abs(np.delete(A_e, [*rate, *drive], axis=0)).max(initial=0.0)))
-        gap, apart = max(gaps), self._command_gap(c, takes=takes, gain=gain, angle=angle)
+        by_motors = question.feedback in ("motor", "static_joint")
+        certified = question.criterion is Criterion.CERTIFIED
+        known = proof if certified and by_motors and self.at is Place.POSTURE else None
+        gap = max(gaps)
+        apart = self._command_gap(known, takes=takes, gain=gain, angle=angle)
         words = f"K, D_θ, D_s, friction and drives to {gap:.1e}, F over B_s to {apart:.1e}"
         ok = gap <= AGREEMENT and apart <= _DIFFERENCES
         return Check(name="frozen loop: motors", ok=ok, detail=words)
 
-    def _command_gap(self, c: "Certificate", *, takes: Array, gain: Array, angle: Array) -> float:
+    def _command_gap(
+        self, proof: InstantProof | None, *, takes: Array, gain: Array, angle: Array
+    ) -> float:
         """How far A_1 is from rows that take the command, τ_osc = −F θ + … of free motions.
 
         F is that of the instant's own proof, where the loop is frozen in its posture and motor
@@ -198,10 +211,7 @@ class LocalLoop:
         command = self.A_1[takes] / gain[:, None]
         elsewhere = np.delete(self.A_1, takes, axis=0)
         gap = float(np.abs(elsewhere).max(initial=0.0)) / _size(self.A_1)
-        proof = c.evidence.proof_of(c.answer.critical.instant)
-        certified = c.question.criterion is Criterion.CERTIFIED
-        by_motors = certified and c.question.feedback in ("motor", "static_joint")
-        if proof is not None and by_motors and self.at is Place.POSTURE:
+        if proof is not None:
             gap = max(gap, float(np.abs(command[:, angle] + proof.F).max()) / _size(proof.F))
             gap = max(gap, float(np.abs(command[:, angle[-1] + 1 :]).max()) / _size(proof.F))
         return gap
@@ -236,10 +246,8 @@ class LocalLoop:
         A_e = late[0] if late else None
         return DelayedLoop(A_0=A_0, A_1=A_1, A_e=A_e, embedded=self.embedded_delay_s)
 
-    def _margin_check(self, c: "Certificate") -> Check:
+    def _margin_check(self, here: float | None, crossing: float | None) -> Check:
         """The margin is the first crossing, or 0 where a mode is unstable."""
-        here = c.evidence.instant_margins_s[c.answer.critical.instant]
-        crossing = c.answer.first_crossing_s
         ok = here == (0.0 if here == 0.0 else crossing)
         ok &= (self.frequency_rad_s is not None) == (crossing is not None and crossing < math.inf)
         late = self.embedded_delay_s
@@ -248,27 +256,12 @@ class LocalLoop:
         return Check(name="local margin", ok=ok, detail=words)
 
 
-def without_loop(c: "Certificate") -> Check:
-    """Check that nothing is claimed of a loop that is not in the file.
-
-    Args:
-        c: the certificate.
-    """
-    answer, at = c.answer, c.answer.critical.instant
-    rests = answer.equilibrium is not None and answer.equilibrium.found
-    none = c.evidence.instant_margins_s[at] == 0.0 and not rests
-    known = c.evidence.instant_basis[at] is not Basis.OPEN and not none
-    ok = not known and answer.unstable_modes == 0 and answer.first_crossing_s is None
-    words = "no frozen loop is in the file, and nothing is claimed of it"
-    return Check(name="frozen loop", ok=ok, detail=words)
-
-
 def _size(A: Array) -> float:
     return max(float(np.abs(A).max(initial=0.0)), 1e-300)
 
 
-def _unstable(c: "Certificate", loop: DelayedLoop) -> Check:
-    name, claimed = "unstable modes without delay", c.answer.unstable_modes
+def _unstable(claimed: int, loop: DelayedLoop) -> Check:
+    name = "unstable modes without delay"
     if loop.A_e is not None:
         found = unstable_roots(loop, 0.0, omega=None)
         words = f"{claimed} claimed, {found} counted, argument principle in floating point"

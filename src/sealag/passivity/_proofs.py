@@ -1,10 +1,9 @@
 """Matrix inequalities of a certificate, each checked from its own numbers alone."""
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from sealag.passivity._checks import Check
 from sealag.passivity._definite import (
     Decision,
     Reader,
-    as_doubles,
     like,
     positive_complement,
     positive_definite,
@@ -21,11 +19,9 @@ from sealag.passivity._definite import (
 )
 from sealag.passivity._kinds import Criterion
 from sealag.passivity._layout import Matrix
+from sealag.passivity._statement import Question
 from sealag.typing import Array
 from sealag.units import time_text
-
-if TYPE_CHECKING:
-    from sealag.passivity._certificate import Certificate, Question
 
 SYMMETRY = 1e-7
 """Relative asymmetry up to which a certified stiffness counts as symmetric. Ten times less refuses
@@ -68,17 +64,18 @@ class InstantProof:
     W: tuple[Annotated[Array, "", ""], ...]
     Q: tuple[Annotated[Array, "", ""], ...]
 
-    def checks(self, c: "Certificate", number: Reader) -> Iterator[Check]:
+    def checks(self, question: Question, number: Reader, *, bound_s: float) -> Iterator[Check]:
         """Check the claimed delay, the law's stiffness F and the matrix inequality.
 
         Args:
-            c: the certificate that this proof is part of.
-            number: how its numbers are read: doubles or rationals.
+            question: of the certificate that this proof is part of.
+            number: how numbers are read: doubles or rationals.
+            bound_s: the bound that is claimed for the instant, s.
         """
-        question, name = c.question, f"instant {self.instant}"
+        name = f"instant {self.instant}"
         yield Check(
             name=f"{name}: claimed delay",
-            ok=c.evidence.bounds_s[self.instant] == self.delay_s and self.delay_s > 0.0,
+            ok=bound_s == self.delay_s and self.delay_s > 0.0,
             detail=time_text(self.delay_s),
         )
         yield from self._stiffness_checks(name, question, number)
@@ -88,9 +85,9 @@ class InstantProof:
         )
         yield Check(name=f"{name}: W = d Q", ok=gap <= AGREEMENT, detail=f"to {gap:.1e}")
         found = decided(lambda number: self._dissipates(question, number), number)
-        yield _inequality(f"{name}: matrix inequality", found, self.W)
+        yield inequality(f"{name}: matrix inequality", found, self.W)
 
-    def _dissipates(self, question: "Question", number: Reader) -> Decision:
+    def _dissipates(self, question: Question, number: Reader) -> Decision:
         """Decide [[2D − Σ J_iᵀ W_i J_i, d M], [⋆, diag(W)]] ≻ 0."""
         D, d = number(question.D_theta), number(self.delay_s)[()]
         W = [number(block) for block in self.W]
@@ -107,7 +104,7 @@ class InstantProof:
         )
         return dissipates(D, d, M=M, W=W, loss=loss, terms=terms)
 
-    def _stiffness_checks(self, name: str, question: "Question", number: Reader) -> Iterator[Check]:
+    def _stiffness_checks(self, name: str, question: Question, number: Reader) -> Iterator[Check]:
         """Check that F is the stiffness of the law that the file names."""
         J, S, G, F = map(number, (self.J_star, self.stiffness, self.F_gravity, self.F))
         certified = question.criterion is Criterion.CERTIFIED
@@ -265,112 +262,14 @@ def dissipates(
     return positive_complement(factor * D, loss, d * M, whole, terms=(loss_terms, d * M_terms))
 
 
-def _inequality(name: str, found: Decision, W: Sequence[Array]) -> Check:
+def inequality(name: str, found: Decision, W: Sequence[Array]) -> Check:
+    """Say whether the inequality holds with symmetric multipliers.
+
+    Args:
+        name: of the check.
+        found: what `dissipates` decides.
+        W: the multipliers.
+    """
     holds = found.holds and all(bool((block == block.T).all()) for block in W)
     text = f"[[2D - J'WJ, dM], [dM', W]] {'is' if holds else 'is not'} positive definite"
     return Check(name=name, ok=holds, detail=f"{text} ({found.words})")
-
-
-def _stated(name: str, longest: float | None, *, there: bool) -> Check:
-    """A multiplier belongs to a positive finite delay, and only to one."""
-    needed = longest is not None and 0.0 < longest < math.inf
-    if longest is None:
-        words = "not asked for" if not there else "it is there, but no delay is claimed for it"
-    else:
-        words = f"it is {'there' if there else 'missing'} for {time_text(longest)}"
-    return Check(name=f"{name}, if claimed", ok=needed == there, detail=words)
-
-
-def common_checks(c: "Certificate", number: Reader) -> Iterator[Check]:
-    """Check the multiplier shared by all instants, at those whose numbers are in the file.
-
-    Args:
-        c: the certificate.
-        number: how its numbers are read: doubles or rationals.
-    """
-    longest, W = c.answer.common_multiplier_delay_s, c.evidence.common_multiplier
-    proofs, D_theta = c.evidence.proofs, c.question.D_theta
-    yield _stated("common multiplier", longest, there=W is not None)
-    if not longest or W is None or longest == math.inf:
-        return
-
-    def shared(F: Array, number: Reader) -> Decision:
-        block = number(W)
-        return dissipates(number(D_theta), number(longest)[()], M=number(F), W=[block], loss=block)
-
-    bad = []
-    for proof in proofs:
-        found = decided(lambda number, F=proof.F: shared(F, number), number)
-        here = _inequality("", found, [W])
-        bad += [] if here.ok else [f"instant {proof.instant}: {here.detail}"]
-    good = f"[[2D - W, dF], [dF', W]] > 0 at each for {time_text(longest)}"
-    yield Check(
-        name=f"common multiplier at {len(proofs)} of {c.question.instants} instants",
-        ok=not bad and bool(proofs),
-        detail=bad[0] if bad else good,
-    )
-
-
-def window_checks(c: "Certificate", number: Reader) -> Iterator[Check]:
-    """Check the time-varying bound: every vertex with the ball around it, in every window.
-
-    ‖[D^-½C, d D^-½FC^-ᵀ]‖₂ ≤ √2 − r at the vertices, W = C Cᵀ, gives ≤ √2 in the whole window; it
-    says [[(√2 − r)² D − W, dF], [dFᵀ, W]] ⪰ 0.
-
-    Args:
-        c: the certificate.
-        number: how its numbers are read: doubles or rationals.
-    """
-    longest, W = c.answer.time_varying_delay_s, c.evidence.time_varying_multiplier
-    windows = c.evidence.time_varying_windows
-    yield _stated("time-varying multiplier", longest, there=W is not None)
-    yield _stated("time-varying windows", longest, there=bool(windows))
-    if not longest or W is None or not windows or longest == math.inf:
-        return
-    D, d, block = number(c.question.D_theta), number(longest)[()], number(W)
-    bad, vertices = [] if bool((W == W.T).all()) else ["the multiplier is asymmetric"], 0
-    for window in windows:
-        place = f"instants {window.first} … {window.last}"
-        if not (0.0 <= window.radius < 1.0 and window.first <= window.last):
-            bad.append(f"{place} with radius {window.radius} are not a window")
-            continue
-        factor = number((math.sqrt(2.0) - window.radius) ** 2 * (1.0 - 1e-12))[()]
-        for F in window.vertices(number):
-            vertices += 1
-            found = dissipates(D, d, M=F, W=[block], loss=block, factor=factor)
-            bad += [] if found.holds else [f"{place}: {found.words}"]
-    good = f"{vertices} vertices with their balls dissipate for {time_text(longest)}"
-    yield Check(
-        name=f"time-varying multiplier in all {len(windows)} windows",
-        ok=not bad,
-        detail=bad[0] if bad else good,
-    )
-    held = np.zeros(c.question.instants, dtype=bool)
-    for window in windows:
-        held[window.first : window.last + 1] = True
-    text = f"{held.sum()} of {len(held)} instants lie in a window"
-    yield Check(name="time-varying windows cover the motion", ok=bool(held.all()), detail=text)
-    if not bad:
-        yield _members(c, W=as_doubles(block), d=longest)
-
-
-def _members(c: "Certificate", *, W: Array, d: float) -> Check:
-    """That the instants with numbers lie in the sets, in doubles."""
-    root, C = np.sqrt(c.question.D_theta), np.linalg.cholesky(W)
-    proofs = c.evidence.proofs
-    pairs = [
-        (proof, window)
-        for proof in proofs
-        for window in c.evidence.time_varying_windows
-        if window.first <= proof.instant <= window.last
-    ]
-    outside = []
-    for proof, window in pairs:
-        far = d * window.distance(proof.F, root=root, C=C)
-        if not far <= window.radius + AGREEMENT:
-            outside.append(f"instant {proof.instant} is {far:.3e} from its box")
-    return Check(
-        name=f"time-varying windows hold the {len(proofs)} instants with a proof",
-        ok=not outside,
-        detail=outside[0] if outside else f"{len(pairs)} memberships, floating point",
-    )

@@ -6,18 +6,15 @@ the numerical radius w = max_φ λ_max(H(φ)), H(φ) = ½ (e^{jφ} A + e^{-jφ} 
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sealag.passivity._checks import Check
 from sealag.passivity._definite import Reader
 from sealag.passivity._proofs import AGREEMENT, InstantProof
+from sealag.passivity._stated import Stated
 from sealag.typing import Array
 from sealag.units import time_text
-
-if TYPE_CHECKING:
-    from sealag.passivity._certificate import Certificate
 
 _ANGLES = 720
 _POLISH = 60
@@ -25,7 +22,7 @@ _POLISH = 60
 times fewer thirdings the peak is known to 1 % of a step only."""
 
 
-def worst_checks(c: "Certificate", number: Reader) -> Iterator[Check]:
+def worst_checks(c: Stated, number: Reader) -> Iterator[Check]:
     """Check limiting direction, worst motion and upper end.
 
     Args:
@@ -51,7 +48,7 @@ def worst_checks(c: "Certificate", number: Reader) -> Iterator[Check]:
     )
 
 
-def _direction(c: "Certificate") -> Check:
+def _direction(c: Stated) -> Check:
     """Shares of the damping power y* D_θ y, which is 1."""
     real, imaginary = c.evidence.worst_motion
     power = c.question.D_theta * (real**2 + imaginary**2)
@@ -65,7 +62,7 @@ def _direction(c: "Certificate") -> Check:
     )
 
 
-def _refuted(c: "Certificate", number: Reader, proof: InstantProof) -> Check:
+def _refuted(c: Stated, number: Reader, proof: InstantProof) -> Check:
     """d |y* F y| ≥ y* D_θ y at the upper end, for the worst motion y."""
     upper = c.answer.max_delay_upper_s
     if upper == math.inf:
@@ -80,7 +77,7 @@ def _refuted(c: "Certificate", number: Reader, proof: InstantProof) -> Check:
     return Check(name="upper end", ok=bool(refuted), detail=words)
 
 
-def _maximiser(c: "Certificate", A: Array) -> Check:
+def _maximiser(c: Stated, A: Array) -> Check:
     """The worst motion is the eigenvector of the largest eigenvalue at its own angle."""
     real, imaginary = c.evidence.worst_motion
     x = np.sqrt(c.question.D_theta) * (real + 1j * imaginary)
