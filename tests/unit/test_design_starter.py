@@ -5,9 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from sealag.design import starter_project
-from sealag.design._project import parse_project
-from sealag.design._schema import Project
+from sealag.design import parse_project, starter_project
 from sealag.errors import ProjectError
 from sealag.robot import load_robot, reference_posture, resolve_urdf
 
@@ -94,7 +92,7 @@ def test_commented_keys_are_the_schema_s_with_its_defaults():
         type(given.actuators.default).model_fields
     )
     assert set(given.controller.model_fields_set) == set(type(given.controller).model_fields)
-    assert {"motion", "walking"} <= given.model_fields_set <= set(Project.model_fields)
+    assert {"motion", "walking"} <= given.model_fields_set <= set(type(given).model_fields)
     with pytest.raises(ProjectError, match="frictoin"):
         filled("\n".join(lines[start:]).replace("\nfriction", "\nfrictoin", 1))
 

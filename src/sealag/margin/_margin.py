@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.errors import InputError, SolverError
-from sealag.margin._crossings import Crossing, crossings_of
+from sealag.margin._crossings import Crossing, Found, crossings_of
 from sealag.margin._loop import (
     Loop,
     has_zero_root,
@@ -23,6 +23,9 @@ from sealag.typing import Array, ArrayLike
 
 _RESIDUAL = 1e-9
 _AT = 1e-9
+_MOST_IF_UNSTABLE = 3_000
+"""Samples spent on the first crossing of an unstable loop. Robots need tens to hundreds; ten times
+more take half a minute for zero roots that hide the crossings."""
 _METHOD = "excluded intervals, Newton"
 _UNDAMPED = "undamped motion that the delay does not reach"
 
@@ -165,8 +168,8 @@ def _margin(loop: Loop, *, longest: float) -> DelayMargin:
             first_crossing=math.nan, guaranteed=False, method=_UNDAMPED,
         )  # fmt: skip
     zero_root = on_axis and has_zero_root(loop)
-    found = crossings_of(picture, *search(picture))
-    if unstable and not (found.explained or zero_root):  # the margin is 0 all the same
+    found = _found(picture, unstable=unstable)
+    if found is None or (unstable and not (found.explained or zero_root)):
         return replace(
             _answer(loop, (), unstable=unstable, longest=longest),
             first_crossing=math.nan, guaranteed=False,
@@ -184,6 +187,17 @@ def _margin(loop: Loop, *, longest: float) -> DelayMargin:
             "the crossing; the margin is not known."
         )
     return replace(answer, guaranteed=found.decided and found.explained and not zero_root)
+
+
+def _found(picture: Picture, *, unstable: int) -> Found | None:
+    """The crossings; None if the loop is unstable and the search does not close: the margin is 0
+    all the same, so that no long search is worth its time."""
+    if not unstable:
+        return crossings_of(picture, *search(picture))
+    try:
+        return crossings_of(picture, *search(picture, most=_MOST_IF_UNSTABLE))
+    except SolverError:
+        return None
 
 
 def _picture(loop: Loop, *, longest: float, on_axis: bool) -> Picture | None:

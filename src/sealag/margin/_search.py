@@ -16,7 +16,9 @@ from sealag.margin._pictures import Picture
 
 _SHRINK = 1.5
 _LEAST = 0.12
-_MOST_SAMPLES = 60_000
+MOST_SAMPLES = 60_000
+"""Samples at most. Ten times fewer leave dense loops with hundreds of crossings open; ten times
+more take an hour for loops that never close."""
 
 
 class Piece(NamedTuple):
@@ -75,17 +77,18 @@ class Band:
     end: bool
 
 
-def search(picture: Picture) -> tuple[list[Passage], list[Band]]:
+def search(picture: Picture, *, most: int = MOST_SAMPLES) -> tuple[list[Passage], list[Band]]:
     """Exclude everything but passages and narrow bands.
 
     Args:
         picture: the parameter and its families.
+        most: samples at most.
 
     Returns:
         The passages, and the bands joined and in order.
 
     Raises:
-        SolverError: more samples than any sensible loop needs.
+        SolverError: more samples than that are needed.
     """
     edges = picture.edges
     todo = [_piece(picture, one, other) for one, other in pairwise(edges)]
@@ -95,7 +98,7 @@ def search(picture: Picture) -> tuple[list[Passage], list[Band]]:
     while todo:
         piece = todo.pop()
         samples += 1
-        if samples > _MOST_SAMPLES:
+        if samples > most:
             raise SolverError(
                 "The search for crossings does not close: the loop is too close to losing "
                 "stability over a whole band of frequencies, or its matrices are badly scaled."
