@@ -11,11 +11,6 @@ AT_KERNELS = {
     "tests/reference/test_kernels_plant.py",
 }
 """Twins of kernels whose arrays only the room that calls them lays out."""
-WITH_PASSIVITY = {
-    "tests/unit/test_passivity_verify.py",
-    "tests/unit/test_certificate_forgeries.py",
-    "tests/oracle/test_passivity_multitask.py",
-}
 TEXT = re.compile(r"\bsealag(?:\.\w+)*\._[a-z]\w*")
 """A private module by its dotted name, also as text for monkeypatch."""
 
@@ -37,7 +32,7 @@ def test_only_public_names_are_used() -> None:
         for path in (ROOT / folder).rglob("*.py")
         if "meta" not in path.parts and (names := private_names(path.read_text()))
     }
-    assert set(found) <= AT_KERNELS | WITH_PASSIVITY
+    assert set(found) <= AT_KERNELS
 
 
 def test_check_sees_private_names() -> None:
