@@ -61,7 +61,6 @@ class WalkCase:
         seed: of noise and model errors.
         physics: step of the plant, s.
         embedded: period at which the drives look for commands, s; 0 for at once.
-        log_period: between logged instants, s.
     """
 
     walking: Walking
@@ -75,7 +74,6 @@ class WalkCase:
     seed: int = 0
     physics: float = 1e-3
     embedded: float = 0.0
-    log_period: float = 1e-3
 
     def walks(self, **changes: Any) -> Self:
         """Return the case with another walk.
@@ -164,7 +162,6 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
         clock=Clock(physics=case.physics, embedded=case.embedded, central=TICK),
         scene=Scene.of_walk(case.walking, case.pushes),
         seed=case.seed,
-        log_period=case.log_period,
     )
     return Walk(
         case=case,

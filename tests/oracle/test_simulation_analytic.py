@@ -110,9 +110,8 @@ def _pendulum(folder, step):
         q=np.array([1.0, 0.5]),
         theta=np.array([1.0, 0.5]),
         duration=60.0,
-        clock=Clock(physics=step, central=step),
+        clock=Clock(physics=step, central=step, log=20 * step),
         scene=Scene(),
-        log_period=20 * step,
     )
 
 

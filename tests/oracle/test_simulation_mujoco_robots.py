@@ -56,13 +56,12 @@ class Case:
         run = closed_loop(
             self.robot, self.springs, self.controller(),
             q=self.q, v=self.v, theta=self.theta, duration=DURATION,
-            clock=Clock(physics=step, central=TICK),
+            clock=Clock(physics=step, central=TICK, log=2e-3),
             network=Network(**{k: Link(delay=Constant(d)) for k, d in links.items()}),
             scene=Scene(
                 pushes=[Push(frame=self.frame, force=tuple(force), start=START, duration=LASTING)],
                 fall=None,
             ),
-            log_period=2e-3,
         )  # fmt: skip
         assert run.outcome is Outcome.COMPLETED, run.message
         assert run.ages.total == pytest.approx(UP + DOWN + DRIVE + late + TICK, abs=1e-12)

@@ -86,7 +86,7 @@ def test_the_declared_force_does_the_booked_work(anymal):
     fine = closed_loop(
         robot, anymal[1], ConstantTorque(np.zeros(robot.n)), q=anymal[2],
         theta=robot.joint_positions(anymal[2]), duration=END,
-        clock=Clock(physics=2.5e-5, central=0.01), log_period=2.5e-5,
+        clock=Clock(physics=2.5e-5, central=0.01, log=2.5e-5),
         scene=Scene(pushes=[push], fall=None),
     )  # fmt: skip
     inside = (fine.time >= push.start) & (fine.time <= push.start + push.duration)

@@ -72,7 +72,7 @@ def _run(arm, log, curl=0.0, fine=FINE):
     return closed_loop(
         robot, springs, Pendulums(curl), q=q, theta=q + np.array([0.05, 0.02, -0.03]),
         v=np.array([1.0, -2.0, 0.5]), duration=DURATION,
-        clock=Clock(physics=fine, central=PERIOD), network=network, log_period=log,
+        clock=Clock(physics=fine, central=PERIOD, log=log), network=network,
         scene=Scene(
             pushes=[Push(frame="link2", force=(8.0, 0.0, 3.0), start=0.05, duration=0.15)]
         ),

@@ -54,8 +54,7 @@ def test_each_joint_s_own_damping_is_in_the_books(tmp_path):
         q=np.array([0.9, -0.5]),
         v=np.array([1.0, -3.0]),
         duration=0.3,
-        clock=Clock(physics=2.5e-4, central=1e-3),
-        log_period=2.5e-4,
+        clock=Clock(physics=2.5e-4, central=1e-3, log=2.5e-4),
     )
     dense = np.trapezoid(damping * run.v**2, run.time, axis=0)
     booked = run.audit.joint_flows["joint_damping"]

@@ -159,8 +159,10 @@ def _run(folder, delays, physics):
     controller = _Recorder(np.zeros(1), stiffness=40.0, motor=True)
     run = closed_loop(
         robot, springs, controller, q=np.array([0.3]), theta=np.array([0.25]), duration=0.1,
-        clock=Clock(physics=physics, central=CENTRAL, embedded=delays.embedded_period),
-        network=Network.from_delays(delays), log_period=physics,
+        clock=Clock(
+            physics=physics, central=CENTRAL, embedded=delays.embedded_period, log=physics
+        ),
+        network=Network.from_delays(delays),
     )  # fmt: skip
     return run, np.array(controller.rows)
 

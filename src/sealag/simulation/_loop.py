@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.simulation._plant import FASTEST, Plant
 from sealag.simulation._run import Log, Run
 from sealag.simulation._scene import Scene
+from sealag.simulation._start import Start
 from sealag.typing import Array
 from sealag.whole_body import (
     Measurement,
@@ -39,17 +40,13 @@ def closed_loop(
     actuators: Actuators,
     controller: TickController,
     *,
-    q: Array,
     duration: float,
-    v: Array | None = None,
-    theta: Array | None = None,
-    theta_dot: Array | None = None,
     network: Network | None = None,
     clock: Clock | None = None,
     scene: Scene | None = None,
     seed: int = 0,
-    log_period: float | None = None,
     progress: Callable[[float], None] | None = None,
+    **start: Unpack[Start],
 ) -> Run:
     """Simulate robot, springs, contacts, links and controller together.
 
@@ -57,18 +54,13 @@ def closed_loop(
         robot: The robot.
         actuators: Its springs and motors.
         controller: Any TickController.
-        q: Configuration at the start (nq,).
         duration: How long to simulate, s.
-        v: Velocity at the start (nv,); default at rest.
-        theta: Motor angles at the start (n,), rad; default such that the springs carry the
-            controller's first command.
-        theta_dot: Motor speeds at the start (n,), rad/s; default the joint rates.
         network: Delays, jitter and losses; default none.
-        clock: Periods of physics and controllers.
+        clock: Periods of physics, controllers and log.
         scene: Feet, ground, pushes and fall limits.
         seed: Seed of jitter and losses; the same seed gives the same run.
-        log_period: Time between logged instants, s; default the central period.
         progress: Called with the simulated time every 0.1 s.
+        start: The first state, as `Start` names it; q is needed.
 
     Returns:
         The run. A fall, divergence, failing controller or Ctrl-C ends it early with a named
@@ -82,8 +74,13 @@ def closed_loop(
         robot, actuators, controller, network or Network.ideal(), clock or Clock(),
         scene or Scene(), seed,
     )  # fmt: skip
-    loop.prepare(_state("q", q, robot.nq), _state("v", v, robot.nv), theta, theta_dot)
-    period = loop.clock.central if log_period is None else log_period
+    loop.prepare(
+        _state("q", start["q"], robot.nq),
+        _state("v", start.get("v"), robot.nv),
+        start.get("theta"),
+        start.get("theta_dot"),
+    )
+    period = loop.clock.central if loop.clock.log is None else loop.clock.log
     return loop.run(duration, period, progress)
 
 

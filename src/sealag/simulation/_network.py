@@ -72,6 +72,7 @@ class Clock:
         embedded: Period at which measurements are sent and the drives look for commands, s;
             0 for at once, whatever the physics step.
         central: Period of the central controller, s.
+        log: Period between logged instants, s; the central one if None.
 
     Raises:
         InputError: A period is not positive or not a whole multiple.
@@ -80,6 +81,7 @@ class Clock:
     physics: float = 1e-3
     embedded: float = 0.0
     central: float = 1e-3
+    log: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("physics", "embedded", "central"):
