@@ -255,9 +255,9 @@ def test_zero_roots_decide_the_margin_where_they_hide_the_crossings():
     """Six joints are compensated and held by no task: the margin is 0, and no search says when
     another root would cross."""
     certificate = sealag.certify(case("free_compensated_joints"))
-    assert (certificate.stable, certificate.unstable_modes) == (False, 6)
-    assert certificate.local_margin_s == 0.0
-    assert certificate.first_crossing_s is None
+    assert (certificate.answer.stable, certificate.answer.unstable_modes) == (False, 6)
+    assert certificate.answer.local_margin_s == 0.0
+    assert certificate.answer.first_crossing_s is None
     held = case("free_compensated_joints")
     posture = replace(held.law.tasks[0], name="all", kind="posture", frame=None, axes=())
-    assert sealag.certify(replace(held, law=replace(held.law, tasks=(posture,)))).stable
+    assert sealag.certify(replace(held, law=replace(held.law, tasks=(posture,)))).answer.stable
