@@ -9,8 +9,9 @@ USERS = ("tests", "bench", "examples", "studies")
 AT_KERNELS = {
     "tests/reference/test_kernels_control_law.py",
     "tests/reference/test_kernels_plant.py",
+    "tests/unit/test_simulation_scenes.py",
 }
-"""Twins of kernels whose arrays only the room that calls them lays out."""
+"""Twins of kernels whose arrays only their room lays out, and a plant that is broken on purpose."""
 WITH_PASSIVITY = {
     "tests/unit/test_passivity_verify.py",
     "tests/unit/test_certificate_forgeries.py",
