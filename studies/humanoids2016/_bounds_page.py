@@ -153,6 +153,8 @@ def beyond_section(found: Findings) -> Section:
     """
     certificate = found.certificate
 
+    answer, feedback = certificate.answer, certificate.question.feedback.replace("_", " ")
+
     def ms(value: float | None) -> str:
         return "nothing" if value is None else f"{value * 1e3:.2f} ms"
 
@@ -167,11 +169,11 @@ def beyond_section(found: Findings) -> Section:
                     [
                         "(i) time-varying J*, Λ and stiffness",
                         "One constant multiplier for the whole planned walk, which V_4 needs, "
-                        f"allows {ms(certificate.common_multiplier_delay_s)}; arbitrarily "
+                        f"allows {ms(answer.common_multiplier_delay_s)}; arbitrarily "
                         "time-varying matrices inside polytopes around it, window by window, "
-                        f"{ms(certificate.time_varying_delay_s)}; the pointwise bound is "
-                        f"{ms(certificate.max_delay_s)} "
-                        f"({certificate.feedback.replace('_', ' ')} feedback).",
+                        f"{ms(answer.time_varying_delay_s)}; the pointwise bound is "
+                        f"{ms(answer.max_delay_s)} "
+                        f"({feedback} feedback).",
                     ],
                     [
                         "(ii) to (iv)",

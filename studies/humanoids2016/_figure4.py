@@ -185,7 +185,7 @@ def _certified(
         delay_s=bounds.delay,
         contraction=float(spaces.contraction.max()),
         asymmetry=float(np.nanmax(spaces.asymmetry)),
-        reason="; ".join(bounds.reasons),
+        reason="; ".join(bounds.refusals),
     )
 
 

@@ -59,7 +59,7 @@ QUICK = StudySize(
     scales=(1.0, 6.0),
     betas=(0.5,),
 )
-"""A page with few cases, in less than a minute."""
+"""A page with few cases, in some two minutes of one core."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ import numpy as np
 from humanoids2016._random_plants import SeaPlant, random_sea_plant
 from sealag.errors import SolverError
 from sealag.margin import delay_margin
-from sealag.passivity import max_delay, max_delay_from_stiffness
+from sealag.passivity import Instant, Problem, max_delay, solve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +60,8 @@ def compare_plant(seed: int, *, joints: int | None = None) -> PlantComparison:
     published = max_delay(plant.J, plant.Lambda, plant.K_x, plant.D_theta, form=plant.form.printed)
     certified = None
     if plant.certifiable and plant.stable:
-        certified = float(max_delay_from_stiffness(plant.F, plant.D_theta).delay)
+        problem = Problem.of_stiffness(plant.F, plant.D_theta)
+        certified = float(solve(problem, share=Instant()).delay)
     try:
         margin = delay_margin(plant.A_0, plant.A_1, symmetries=plant.symmetries).delay
     except SolverError:

@@ -6,7 +6,7 @@ import numpy as np
 
 from sealag.actuation import actuators
 from sealag.margin import DelayMargin, delay_margin
-from sealag.passivity import max_delay, max_delay_from_stiffness
+from sealag.passivity import Instant, Problem, max_delay, solve
 from sealag.typing import Array
 from sealag.whole_body import sea_loop
 
@@ -70,7 +70,8 @@ def _one_joint(M: float, K_q: float, *, link_feedback: bool = False) -> UnsafeEx
     F = np.array([[K_q]]) if link_feedback else K_theta
     margin = delayed_margin(np.array([[M]]), K, B_s, D=D, F=F, link_feedback=link_feedback)
     signal = "link angle" if link_feedback else "q̄(θ)"
-    certified = None if link_feedback else float(max_delay_from_stiffness(K_theta, D).delay)
+    bound = solve(Problem.of_stiffness(K_theta, D), share=Instant())
+    certified = None if link_feedback else float(bound.delay)
     return UnsafeExample(
         name=f"one joint, M = {M:g} kg m², K = 350, K_q = {K_q:g} Nm/rad, feedback of {signal}",
         published_delay_s=float(published.delay),

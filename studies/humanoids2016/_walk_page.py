@@ -189,8 +189,8 @@ def energy_section(found: Findings) -> Section:
         if observed.passive
         else f"not passive from {observed.first_violation:.3f} s on, {observed.joint} first"
     )
-    bound = certificate.max_delay_s * 1e3
-    verdict = certificate.status.value.replace("_", " ")
+    question, answer = certificate.question, certificate.answer
+    bound, verdict = answer.max_delay_s * 1e3, answer.status.value.replace("_", " ")
     return Section(
         anchor="energy",
         title="Energy of the walk",
@@ -208,8 +208,8 @@ def energy_section(found: Findings) -> Section:
                     "passive only if it stores at least as much at the start. Lifting the robot "
                     f"took {lifted:.1f} J of it, impacts {impact:.2f} J. The certificate covers "
                     "the position loop of Theorem 1 only: "
-                    f"{verdict}, d_1 up to {bound:.1f} ms against {certificate.delay_s * 1e3:.1f} "
-                    f"ms, fed back {certificate.feedback.replace('_', ' ')}."
+                    f"{verdict}, d_1 up to {bound:.1f} ms against {question.delay_s * 1e3:.1f} "
+                    f"ms, fed back {question.feedback.replace('_', ' ')}."
                 )
             ),
         ],

@@ -41,22 +41,26 @@ def walk():
 
 def test_a_good_solver_certifies_both_designs(walk):
     certificate = sealag.certify(*walk, time_varying=True)
-    assert certificate.status == "certified"
-    assert certificate.left_open == {}
-    assert certificate.delay_s <= certificate.time_varying_delay_s
-    assert sealag.certify(crawl(), criterion="published").status == "certified"
+    assert certificate.answer.status == "certified"
+    assert certificate.answer.left_open == {}
+    assert certificate.question.delay_s <= certificate.answer.time_varying_delay_s
+    assert sealag.certify(crawl(), criterion="published").answer.status == "certified"
 
 
 @pytest.mark.parametrize("name", BAD)
 def test_a_bad_solver_of_a_motion_is_not_certified(name, walk):
     solver, words = BAD[name]
     certificate = sealag.certify(*walk, solver=solver)
-    assert certificate.status == "not_certified"
-    assert len(certificate.reasons) == 1
-    assert "one multiplier" in certificate.reasons[0]
-    assert words in certificate.reasons[0]
-    assert words in certificate.left_open["common_multiplier_delay_s"]
-    assert certificate.common_multiplier_delay_s < certificate.delay_s <= certificate.max_delay_s
+    assert certificate.answer.status == "not_certified"
+    assert len(certificate.answer.reasons) == 1
+    assert "one multiplier" in certificate.answer.reasons[0]
+    assert words in certificate.answer.reasons[0]
+    assert words in certificate.answer.left_open["common_multiplier_delay_s"]
+    assert (
+        certificate.answer.common_multiplier_delay_s
+        < certificate.question.delay_s
+        <= certificate.answer.max_delay_s
+    )
     assert failures(plain(certificate), exact=True) == []
 
 
@@ -65,11 +69,11 @@ def test_a_bad_solver_of_polytopes_is_not_certified(walk):
     good = sealag.certify(*walk)
     for answers in range(1, 20):
         certificate = sealag.certify(*walk, time_varying=True, solver=Forgetful(answers))
-        if certificate.common_multiplier_delay_s == good.common_multiplier_delay_s:
+        if certificate.answer.common_multiplier_delay_s == good.answer.common_multiplier_delay_s:
             break
-    assert certificate.status == "not_certified"
-    assert "matrices that move" in certificate.reasons[0]
-    assert set(certificate.left_open) == {"time_varying_delay_s"}
+    assert certificate.answer.status == "not_certified"
+    assert "matrices that move" in certificate.answer.reasons[0]
+    assert set(certificate.answer.left_open) == {"time_varying_delay_s"}
     assert failures(plain(certificate)) == []
 
 
@@ -77,11 +81,11 @@ def test_a_bad_solver_whose_part_is_enough_costs_nothing(walk):
     """What one iteration proves is proven: tightness is lost, no truth."""
     system, motion = walk
     starved = ClarabelDirect(max_iterations=1)
-    proven = sealag.certify(system, motion, solver=starved).common_multiplier_delay_s
+    proven = sealag.certify(system, motion, solver=starved).answer.common_multiplier_delay_s
     certificate = sealag.certify(late(system, 0.99 * proven), motion, solver=starved)
     assert proven > 0.01
-    assert certificate.status == "certified"
-    assert "common_multiplier_delay_s" in certificate.left_open
+    assert certificate.answer.status == "certified"
+    assert "common_multiplier_delay_s" in certificate.answer.left_open
     assert failures(plain(certificate), exact=True) == []
 
 
@@ -93,17 +97,21 @@ def crawl():
 @pytest.mark.parametrize(
     ("solver", "words"),
     [
-        (ClarabelDirect(max_iterations=1), "Clarabel proved too little: MaxIterations"),
-        (Lying(LIES["too large"]), "a liar proved too little: Solved"),
-        (Lying(LIES["not a number"]), "a liar proved too little: Solved"),
+        (ClarabelDirect(max_iterations=1), "Clarabel left the bracket open: MaxIterations"),
+        (Lying(LIES["too large"]), "a liar left the bracket open: Solved"),
+        (Lying(LIES["not a number"]), "a liar left the bracket open: Solved"),
     ],
 )
 def test_a_bad_solver_of_two_levels_is_not_certified(solver, words):
     certificate = sealag.certify(crawl(), criterion="published", solver=solver)
-    assert certificate.status == "not_certified"
-    assert words in certificate.reasons[0]
-    assert words in certificate.left_open["max_delay_s"]
-    assert certificate.max_delay_s < certificate.delay_s < certificate.max_delay_upper_s
+    assert certificate.answer.status == "not_certified"
+    assert words in certificate.answer.reasons[0]
+    assert words in certificate.answer.left_open["max_delay_s"]
+    assert (
+        certificate.answer.max_delay_s
+        < certificate.question.delay_s
+        < certificate.answer.max_delay_upper_s
+    )
     assert failures(plain(certificate), exact=True) == []
 
 
@@ -112,9 +120,9 @@ def test_a_bound_without_a_proof_is_withdrawn(answers):
     """Between bound and multipliers the solver forgets: no error, and no bound."""
     solver = Forgetful(answers)
     certificate = sealag.certify(crawl(), criterion=Criterion.PUBLISHED, solver=solver)
-    assert certificate.status == "not_certified"
-    assert "forgot" in " ".join(certificate.reasons)
-    assert (certificate.max_delay_s == 0.0) == (answers == 1)
+    assert certificate.answer.status == "not_certified"
+    assert "forgot" in " ".join(certificate.answer.reasons)
+    assert (certificate.answer.max_delay_s == 0.0) == (answers == 1)
     assert failures(plain(certificate)) == []
 
 

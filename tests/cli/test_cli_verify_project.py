@@ -75,7 +75,7 @@ def test_what_a_forger_may_reseal_is_found_with_the_project(name):
     data = made(design_name)
     change(data)
     data = resealed(data)
-    assert verify(data).valid, "the file alone is the maker's word here"
+    assert verify(data).valid, "the file alone does not show it"
     result = verify_design(data, *design(design_name))
     assert check in [one.name for one in result.checks if not one.ok]
 

@@ -2,6 +2,8 @@
 
 import copy
 import functools
+import hashlib
+import json
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +13,7 @@ import sealag
 from helpers.designs import EXAMPLES
 from sealag.design import System
 from sealag.errors import CertificateError
-from sealag.passivity import content_digest, read_certificate, verify, write_certificate
+from sealag.passivity import verify, write_certificate
 from sealag.robot import Motion
 from sealag.walking import GroundProfile, plan_walk, walk_motion
 from sealag.whole_body import MotorAngles, Tank
@@ -22,7 +24,7 @@ def plain(certificate: Any) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "c.json"
         write_certificate(certificate, path)
-        return read_certificate(path)
+        return json.loads(path.read_text())
 
 
 @functools.cache
@@ -88,8 +90,11 @@ def without_loop(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def resealed(data: dict[str, Any]) -> dict[str, Any]:
-    """The same with a digest that agrees, as a forger would write it."""
-    return {**data, "hashes": {**data["hashes"], "content": content_digest(data)}}
+    """The same with a digest that agrees, as a forger would write it: SHA-256 of the canonical JSON
+    without the digest itself."""
+    hashes = {key: value for key, value in data["hashes"].items() if key != "content"}
+    text = json.dumps({**data, "hashes": hashes}, sort_keys=True, separators=(",", ":"))
+    return {**data, "hashes": {**hashes, "content": hashlib.sha256(text.encode()).hexdigest()}}
 
 
 def failures(data: dict[str, Any], *, exact: bool = False) -> list[str]:

@@ -79,8 +79,8 @@ def test_a_wrong_instant_is_noticed():
         for k, c in enumerate(motion.contact_index)
     ]
     assert not judge_motion(ours, found)
-    assert judge_motion(ours, replace(found, local_margin_s=0.7))
-    assert judge_motion(ours, replace(found, stable=False))
+    assert judge_motion(ours, replace(found, answer=replace(found.answer, local_margin_s=0.7)))
+    assert judge_motion(ours, replace(found, answer=replace(found.answer, stable=False)))
     assert judge_motion(ours[::-1], found)
 
 

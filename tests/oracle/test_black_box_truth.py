@@ -49,7 +49,7 @@ def test_margins_in_the_posture_and_at_rest(path):
 
 @pytest.mark.parametrize("path", MARGINS, ids=lambda path: path.stem)
 def test_sealag_says_the_smaller_one(path):
-    said = sealag.certify(sealag.load(path), proofs=1).local_margin_s
+    said = sealag.certify(sealag.load(path), proofs=1).answer.local_margin_s
     assert said * 1e3 == pytest.approx(min(MARGINS[path]), rel=2e-6)
 
 
@@ -122,7 +122,7 @@ def test_instants_of_a_motion():
     assert found[1].margin == pytest.approx(0.597454, abs=1e-6)
     assert found[1].rest.margin == pytest.approx(0.61498, abs=1e-5)
     said = sealag.certify(system, motion, proofs=1)
-    assert said.local_margin_s == pytest.approx(found[1].margin, rel=1e-6)
+    assert said.answer.local_margin_s == pytest.approx(found[1].margin, rel=1e-6)
 
 
 def test_two_equilibria_of_the_soft_arm():

@@ -4,9 +4,8 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from sealag.errors import InputError
-from sealag.passivity import max_delay_multitask
-from sealag.passivity._problem import MultiplierProblem, factorise, proven_delays
+from helpers.levels import Saying, problem_of
+from sealag.passivity import Instant, Motion, Problem, solve
 
 
 def corollary_1(tasks, D):
@@ -42,24 +41,44 @@ def problem(seed, sizes, n, form):
 def test_agrees_with_the_sdp(sizes, form):
     for seed in range(2):
         tasks, plain, D = problem(seed, sizes, 3, form)
-        bound = max_delay_multitask(tasks, D, form=form)
+        bound = solve(problem_of(tasks, D, form=form), share=Instant())
         reference = corollary_1(plain, D)
         assert bound.delay <= reference * (1 + 1e-6)
         assert bound.delay >= reference * (1 - 3e-6)
         assert bound.upper >= reference * (1 - 1e-6)
 
 
+@pytest.mark.parametrize("every", [True, False])
+def test_published_batch_is_closed_where_it_is_smallest_or_everywhere(every):
+    """Of a batch the solver closes every bracket, or those that can be the smallest."""
+    tasks, _, D = problem(3, (2, 3), 4, "published")
+    sizes = np.array([1.0, 0.7, 1.3, 1.0])
+    batch = [(size_of(sizes) * J, np.stack([L] * 4), K) for J, L, K in tasks]
+    bound = solve(problem_of(batch, D, form="published"), share=Instant(every=every))
+    single = solve(problem_of(tasks, D, form="published"), share=Instant())
+    np.testing.assert_allclose(bound.delay.min(), single.delay / 1.3**2, rtol=1e-5)
+    closed = bound.width <= 1e-6
+    assert closed[2]
+    assert closed.all() == every
+    assert (bound.delay <= single.upper / sizes**2 * (1 + 1e-9)).all()
+
+
+def size_of(sizes):
+    return sizes[:, None, None]
+
+
 def test_batch_equals_single_instants():
     tasks, _, D = problem(3, (2, 3), 4, "symmetric")
     batch = [(np.stack([J, 2 * J]), np.stack([L, L]), K) for J, L, K in tasks]
-    both = max_delay_multitask(batch, D)
-    np.testing.assert_allclose(both.delay[0], max_delay_multitask(tasks, D).delay, rtol=1e-9)
+    both = solve(problem_of(batch, D), share=Instant())
+    single = solve(problem_of(tasks, D), share=Instant())
+    np.testing.assert_allclose(both.delay[0], single.delay, rtol=1e-9)
     np.testing.assert_allclose(both.delay[1], both.delay[0] / 4, rtol=1e-9)
 
 
 def proves(A, Y):
-    one = MultiplierProblem(J=np.eye(len(A))[None], M=A[None], blocks=(len(A),))
-    return proven_delays(one, factorise(one, Y))[0] >= 1.0
+    one = Problem(J=np.eye(len(A))[None], M=A[None], blocks=(len(A),))
+    return solve(one, share=Motion(), solver=Saying(W=Y)).delay >= 1.0
 
 
 def test_wrong_multipliers_prove_nothing():
@@ -67,8 +86,3 @@ def test_wrong_multipliers_prove_nothing():
     assert proves(0.9 * A / 1.3, 0.9 * A / 1.3 + 0.01 * np.eye(2))
     assert not proves(A, 0.5 * A)
     assert not proves(1.1 * A / 1.3, 1.1 * A / 1.3)
-
-
-def test_no_task_is_refused():
-    with pytest.raises(InputError, match="at least one task"):
-        max_delay_multitask([], np.ones(3))

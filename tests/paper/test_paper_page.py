@@ -86,7 +86,7 @@ def test_page_needs_no_network_and_holds_the_numbers(written):
     assert text.count("<svg") >= 3
     assert "<canvas" in text
     assert f"{delays.first_crossing[0] * 1e3:.1f}" in text
-    assert f"{certificate.time_varying_delay_s * 1e3:.2f} ms" in text
+    assert f"{certificate.answer.time_varying_delay_s * 1e3:.2f} ms" in text
     assert [cell in text for cell in (">7 / 6<", ">3 / 1<", ">2 / 0<")] == [True] * 3
     assert f"{walk.run.audit.closure:.1e}" in text
     assert delays.walked.tolist() == [[1, 0]]  # the paper's delays, and six times as long ones

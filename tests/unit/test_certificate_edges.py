@@ -124,7 +124,7 @@ def test_holds_and_no_longer_delay_does(name, criterion):
 
 
 def test_bounds_are_those_that_are_known():
-    base = sealag.certify(standing()).max_delay_s
+    base = sealag.certify(standing()).answer.max_delay_s
     certified = {name: bound(name, Criterion.CERTIFIED)["max_delay_s"] for name in DESIGNS}
     for unit in ("1e-3", "1e3"):
         assert certified[f"torque in {unit} Nm"] == pytest.approx(base, rel=1e-6)
@@ -141,7 +141,7 @@ def test_what_the_delay_stands_for_is_said():
     system = standing()
     late = replace(system, delays=replace(system.delays, delayed_torque_feedback=True))
     for design, said in ((system, True), (late, False)):
-        keys = {one.key for one in sealag.certify(design).assumptions}
+        keys = {one.key for one in sealag.certify(design).answer.assumptions}
         assert {"delay_bound", "one_delay"} <= keys
         assert ("torque_feedback" in keys) is said
 

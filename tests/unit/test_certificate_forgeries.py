@@ -2,6 +2,7 @@
 
 import copy
 import json
+import re
 import time
 import tracemalloc
 
@@ -10,7 +11,12 @@ import pytest
 from helpers.certificates import failures, made, resealed
 from sealag.errors import CertificateError
 from sealag.passivity import verify, write_certificate
-from sealag.passivity._verify import MAKERS_WORD
+
+
+def stated_only():
+    """Keys that the documentation of `verify` names as stated and not proven."""
+    text = (verify.__doc__ or "").split("Stated, not proven")[1].split("Args:")[0]
+    return set(re.findall(r"`(\w+)`", text))
 
 
 def text_of(data):
@@ -127,7 +133,7 @@ def _cancel(d):
 
 FORGED = {
     "margin hidden beside a crossing": ("baxter", _cancel),
-    "any joint gives in": (
+    "any joint limits": (
         "baxter",
         lambda d: d["worst"].update(
             direction={name: float(k == 0) for k, name in enumerate(d["joints"])}
@@ -263,12 +269,11 @@ PLACES_OF_BAXTER = list(places("baxter"))
 
 
 @pytest.mark.parametrize(("path", "value"), PLACES_OF_BAXTER, ids=lambda v: str(v)[:40])
-def test_a_change_at_any_key_is_noticed_or_is_named_as_the_makers_word(path, value):
+def test_a_change_at_any_key_is_noticed_or_is_named_as_not_proven(path, value):
     """The digest agrees; baxter has one instant and its proof."""
     found = failures(changed(made("baxter"), path, other(value)))
     if not found:
-        assert path[0] in MAKERS_WORD
-        assert f"`{path[0]}`" in (verify.__doc__ or "")
+        assert path[0] in stated_only()
 
 
 def test_the_walk_meets_every_key():
@@ -276,14 +281,14 @@ def test_the_walk_meets_every_key():
     assert len(PLACES_OF_BAXTER) > 60
 
 
-def test_what_follows_is_not_the_makers_word():
+def test_what_follows_is_proven():
     """Keys whose every change is found."""
     for key in (
         "max_delay_s", "max_delay_upper_s", "worst", "worst_motion", "critical", "stable",
         "local_margin_s", "first_crossing_s", "unstable_modes", "conservatism", "proofs", "status",
         "D_theta", "spring_stiffness", "instants", "schema", "criterion",
     ):  # fmt: skip
-        assert key not in MAKERS_WORD
+        assert key not in stated_only()
 
 
 def test_a_certificate_too_large_to_read_is_not_written(tmp_path):
@@ -292,7 +297,9 @@ def test_a_certificate_too_large_to_read_is_not_written(tmp_path):
     import sealag
 
     certificate = sealag.certify(sealag.load("bundled:hume"))
-    long = replace(certificate, reasons=("x" * 1_000_000,) * 101)
+    long = replace(
+        certificate, answer=replace(certificate.answer, reasons=("x" * 1_000_000,) * 101)
+    )
     with pytest.raises(OSError, match="larger than 100 MB"):
         write_certificate(long, tmp_path / "c.json")
     assert not (tmp_path / "c.json").exists()

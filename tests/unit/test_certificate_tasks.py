@@ -1,11 +1,15 @@
 """Certificates by (31) as printed carry one multiplier for each priority level."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from helpers.certificates import failures, made
+from helpers.levels import problem_of
+from helpers.solvers import Forgetful
 from sealag.errors import SolverError
-from sealag.passivity import max_delay, max_delay_multitask, task_multipliers
+from sealag.passivity import Instant, max_delay, solve
 
 SEED = 31
 
@@ -41,14 +45,15 @@ def test_multipliers_prove_the_printed_inequality_up_to_the_bound():
         tasks, D = random_tasks(rng)
         parts = [float(max_delay(*task, D, form="published").delay) for task in tasks]
         split = 1.0 / sum(1.0 / part for part in parts)
-        best = float(max_delay_multitask(tasks, D, form="published").delay)
+        bound = solve(problem_of(tasks, D, form="published"), share=Instant())
+        best = float(bound.delay)
         assert best > split * 1.001
         for delay in (0.5 * split, split * (1.0 - 1e-7), best * (1.0 - 1e-6)):
-            found = task_multipliers(tasks, D, delay=delay, form="published")
-            assert [one.W.shape for one in found] == [(2, 2), (3, 3)]
-            assert printed(tasks, D, [one.Q for one in found], delay) < 1e-9
+            found = replace(bound, delay=np.array(delay)).prove()
+            assert [block.shape for block in found.blocks] == [(2, 2), (3, 3)]
+            assert printed(tasks, D, [block / delay for block in found.blocks], delay) < 1e-9
         with pytest.raises(SolverError):
-            task_multipliers(tasks, D, delay=best * 1.01, form="published")
+            replace(bound, delay=1.01 * bound.delay).prove()
 
 
 def test_a_task_without_stiffness_takes_next_to_no_damping():
@@ -57,9 +62,22 @@ def test_a_task_without_stiffness_takes_next_to_no_damping():
     J, Lambda, K_x = tasks[1]
     alone = float(max_delay(*tasks[0], D, form="published").delay)
     tasks[1] = (J, Lambda, 0.0 * K_x)
-    delay = alone * (1.0 - 1e-7)
-    found = task_multipliers(tasks, D, delay=delay, form="published")
-    assert printed(tasks, D, [one.Q for one in found], delay) < 1e-9
+    bound = solve(problem_of(tasks, D, form="published"), share=Instant()).eased(1.0 - 1e-7)
+    assert bound.delay == pytest.approx(alone, rel=1e-6)
+    delay = float(bound.delay)
+    assert printed(tasks, D, [block / delay for block in bound.prove().blocks], delay) < 1e-9
+
+
+@pytest.mark.parametrize("form", ["symmetric", "force"])
+def test_symmetric_levels_are_proven_without_a_solver(form):
+    """1/w(Σ A_i) is the bound, beyond 1/Σw, and the solver is not called."""
+    rng = np.random.default_rng(SEED)
+    tasks, D = random_tasks(rng)
+    bound = solve(problem_of(tasks, D, form=form), share=Instant(), solver=Forgetful(0))
+    split = 1.0 / sum(1.0 / float(max_delay(*task, D, form=form).delay) for task in tasks)
+    assert bound.delay > 1.001 * split
+    residual = bound.eased(1.0 - 1e-7).prove(solver=Forgetful(0)).residual()
+    assert residual.lowest > residual.rounding
 
 
 @pytest.mark.parametrize("exact", [False, True])

@@ -67,7 +67,7 @@ def system(folder, network, periods):
 @pytest.mark.parametrize("network", NETWORKS)
 def test_nothing_is_older_than_the_certificate_says(network, periods, tmp_path):
     design = system(tmp_path, NETWORKS[network], PERIODS[periods])
-    assert sealag.certify(design).delay_s == design.delays.d_1
+    assert sealag.certify(design).question.delay_s == design.delays.d_1
     run = sealag.simulate(design, scenario="track", duration=0.5)
     assert run.outcome == "completed"
     assert run.ages.total <= design.delays.d_1 + 1e-9

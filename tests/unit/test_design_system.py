@@ -28,17 +28,17 @@ def system(tmp_path):
 
 def test_it_answers_every_question_without_a_file(system):
     certificate = sealag.certify(system)
-    assert certificate.status == "certified"
+    assert certificate.answer.status == "certified"
     spaces, loop = system.spaces(), system.frozen()
     # gravity is fed back at q̄ too: F_θ = (F_q⁻¹ − K⁻¹)⁻¹ with F_q = K_x − ∂g/∂q
     F_q = 30.0 * np.eye(2) - system.robot.gravity_gradient(system.posture)
     series = np.linalg.inv(np.linalg.inv(F_q) - np.diag(1.0 / system.actuators.spring_stiffness))
     np.testing.assert_allclose(spaces.F_theta[0], series, rtol=1e-6, atol=1e-6)
     margin = margin_of(loop).delay
-    assert certificate.max_delay_s < margin
-    assert certificate.local_margin_s == pytest.approx(margin, rel=1e-9)
+    assert certificate.answer.max_delay_s < margin
+    assert certificate.answer.local_margin_s == pytest.approx(margin, rel=1e-9)
     assert local_margins(system).delay_s == pytest.approx(margin, rel=1e-9)
-    assert certificate.delay_s == system.delays.d_1
+    assert certificate.question.delay_s == system.delays.d_1
     run = system.simulate(scenario="regulate", duration=0.05)
     assert run.outcome is Outcome.COMPLETED
     measured, out = Measurement.allocate(nq=2, nv=2, n=2), np.zeros(2)
@@ -49,7 +49,7 @@ def test_it_answers_every_question_without_a_file(system):
     controller.tick(0.0, measured, out)
     np.testing.assert_allclose(out, rest.tau_sea, atol=1e-9)
     assert (system.text, system.motion_file, system.files) == ("", None, (system.robot.urdf_path,))
-    assert certificate.hashes["project"] == hashlib.sha256(b"").hexdigest()
+    assert certificate.question.hashes["project"] == hashlib.sha256(b"").hexdigest()
 
 
 def test_it_is_what_its_project_file_builds(tmp_path):
@@ -90,11 +90,11 @@ embedded_round_trip = { kind = "constant", value_ms = 2.0 }
         np.testing.assert_allclose(
             getattr(own.frozen(), name), getattr(read.frozen(), name), atol=1e-9
         )
-    ours, theirs = sealag.certify(own), sealag.certify(read)
+    ours, theirs = sealag.certify(own).answer, sealag.certify(read).answer
     assert ours.max_delay_s == pytest.approx(theirs.max_delay_s, rel=1e-12)
     assert ours.local_margin_s == pytest.approx(theirs.local_margin_s, rel=1e-9)
     softer = replace(own, law=replace(own.law, tasks=(joint_task(own.robot, 20.0),)))
-    assert sealag.certify(softer).max_delay_s > 1.2 * ours.max_delay_s
+    assert sealag.certify(softer).answer.max_delay_s > 1.2 * ours.max_delay_s
 
 
 def test_hume_in_fifteen_lines():
@@ -116,8 +116,8 @@ def test_hume_in_fifteen_lines():
         delays=constant_delays(0.004, 0.004),
     )
     certificate = sealag.certify(system)
-    assert 0.0 < certificate.max_delay_s < np.inf
-    assert certificate.stable is False, "a biped on point feet is an inverted pendulum"
+    assert 0.0 < certificate.answer.max_delay_s < np.inf
+    assert certificate.answer.stable is False, "a biped on point feet is an inverted pendulum"
 
 
 def test_a_motion_s_instants_have_loops_of_their_own(system):

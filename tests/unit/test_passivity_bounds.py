@@ -1,15 +1,13 @@
 """Bounds at the edges: refused input, units, batches, zero and nearly singular problems."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from helpers.levels import instant_bound
 from sealag.errors import InputError, SolverError
-from sealag.passivity import (
-    limiting_direction,
-    max_delay,
-    max_delay_from_stiffness,
-    task_multiplier,
-)
+from sealag.passivity import Instant, Motion, Problem, max_delay, solve
 
 J = np.array([[1.0, 0.2, 0.0], [0.0, 1.0, 0.3], [0.1, 0.0, 1.0]])
 LAMBDA = np.diag([1.0, 2.0, 3.0])
@@ -19,11 +17,10 @@ D = np.array([1.0, 2.0, 4.0])
 
 def test_symmetric_stiffness_has_its_spectral_radius():
     F = np.diag([1.0, 8.0, 2.0])
-    bound = max_delay_from_stiffness(F, D)
+    bound = instant_bound(F, D)
     assert bound.delay == pytest.approx(0.25, rel=1e-12)
     assert bound.delay <= 0.25 <= bound.upper
     np.testing.assert_allclose(bound.direction, [0.0, 1.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(limiting_direction(F, D, bound.angle), bound.direction)
 
 
 def test_full_matrices_mean_the_same_as_diagonals():
@@ -88,7 +85,7 @@ def test_nearly_singular_jacobian_and_inertia_keep_the_bracket():
 
 
 def test_repeated_eigenvalues():
-    bound = max_delay_from_stiffness(np.eye(4) * 5.0, np.ones(4))
+    bound = instant_bound(np.eye(4) * 5.0, np.ones(4))
     assert bound.delay == pytest.approx(0.2, rel=1e-12)
     assert bound.delay <= 0.2 <= bound.upper
 
@@ -122,20 +119,21 @@ def test_bad_input_is_refused(words, change):
 def test_bad_stiffness_is_refused():
     for F in (np.ones((2, 3)), np.full((3, 3), np.nan), np.zeros((0, 0)), np.float64(3)):
         with pytest.raises(InputError, match="F has"):
-            max_delay_from_stiffness(F, D)
+            Problem.of_stiffness(F, D)
 
 
 @pytest.mark.parametrize(
     ("m", "n", "rank"), [(3, 3, 3), (6, 3, 3), (2, 4, 2), (6, 6, 4), (4, 4, 1)]
 )
 @pytest.mark.parametrize("form", ["symmetric", "published"])
-def test_task_multiplier_satisfies_the_printed_inequality(m, n, rank, form):
+def test_multiplier_satisfies_the_printed_inequality(m, n, rank, form):
     rng = np.random.default_rng(m + 10 * n)
     jacobian = rng.normal(size=(m, rank)) @ rng.normal(size=(rank, n))
     X = rng.normal(size=(m, m))
     Lambda, gains, damping = X @ X.T + 0.1 * np.eye(m), rng.uniform(1, 50, m), rng.uniform(1, 9, n)
-    delay = (1 - 1e-5) * float(max_delay(jacobian, Lambda, gains, damping, form=form).delay)
-    found = task_multiplier(jacobian, Lambda, gains, damping, delay=delay, form=form)
+    bound = max_delay(jacobian, Lambda, gains, damping, form=form).eased(1 - 1e-5)
+    found = bound.prove()
+    delay, Q = float(found.delay), found.multiplier / found.delay
     w, V = np.linalg.eigh(Lambda)
     half = V * np.sqrt(w) @ V.T
     S = half @ np.diag(gains) @ half if form == "symmetric" else Lambda * gains
@@ -147,16 +145,43 @@ def test_task_multiplier_satisfies_the_printed_inequality(m, n, rank, form):
         unit = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(printed)), 1e-12))
         return np.linalg.eigvalsh(unit[:, None] * printed * unit)[0]
 
-    assert lowest(delay, found.Q) >= -1e-13
-    np.testing.assert_allclose(found.W, delay * found.Q)
-    assert lowest(1.01 * delay, found.Q) < -1e-10, "the check must see a delay that is too long"
+    assert lowest(delay, Q) >= -1e-13
+    assert found.residual().lowest > found.residual().rounding
+    longer = replace(found, delay=1.01 * found.delay)
+    assert lowest(1.01 * delay, Q) < -1e-10, "the check must see a delay that is too long"
+    assert longer.residual().lowest < -longer.residual().rounding
 
 
 def test_no_multiplier_above_the_supremum():
     bound = max_delay(J, LAMBDA, K_X, D)
     with pytest.raises(SolverError, match="at the supremum"):
-        task_multiplier(J, LAMBDA, K_X, D, delay=1.000001 * float(bound.upper))
+        replace(bound, delay=1.000001 * bound.upper).prove()
     with pytest.raises(InputError, match="positive finite"):
-        task_multiplier(J, LAMBDA, K_X, D, delay=np.nan)
+        replace(bound, delay=np.array(np.nan)).prove()
     with pytest.raises(InputError, match="one instant"):
-        task_multiplier(np.stack([J, J]), LAMBDA, K_X, D, delay=0.01)
+        max_delay(np.stack([J, J]), LAMBDA, K_X, D).prove()
+    with pytest.raises(InputError, match="no multiplier to measure"):
+        bound.residual()
+    with pytest.raises(InputError, match="no single direction"):
+        _ = solve(bound.problem, share=Motion()).direction
+
+
+def test_levels_that_are_coupled_or_do_not_fit_are_refused():
+    for levels in ((0, 2), (0, 2, 2, 3), (1, 3), (0,)):
+        with pytest.raises(InputError, match="levels is"):
+            Problem.of_tasks(J, LAMBDA, K_X, D, levels=levels)
+    coupled = LAMBDA + 0.1 * (np.eye(3, k=1) + np.eye(3, k=-1))
+    with pytest.raises(InputError, match="Lambda couples"):
+        Problem.of_tasks(J, coupled, K_X, D, levels=(0, 2, 3))
+    with pytest.raises(InputError, match="K_x couples"):
+        Problem.of_tasks(J, LAMBDA, coupled, D, levels=(0, 2, 3))
+    Problem.of_tasks(J, coupled, K_X, D, levels=(0, 2, 3), form="force")
+
+
+def test_a_refused_instant_has_no_delay_and_says_why():
+    bound = max_delay(np.stack([J, 2 * J]), LAMBDA, K_X, D)
+    refused = bound.refused([1], "the second is refused")
+    assert refused.delay[1] == refused.upper[1] == 0.0
+    assert refused.delay[0] == bound.delay[0]
+    assert refused.refusals == ("the second is refused",)
+    assert solve(bound.problem, share=Instant()).refusals == ()

@@ -224,7 +224,7 @@ def paper(
         "out/paper"
     ),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Only a few cases of each table, in about a minute.")
+        bool, typer.Option("--quick", help="Only a few cases of each table, in minutes.")
     ] = False,
     as_json: Json = False,
 ) -> None:

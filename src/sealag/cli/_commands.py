@@ -13,7 +13,7 @@ from sealag.cli._json import show_json
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import check_output, write_text
-from sealag.passivity import Certificate, Criterion, Status, write_certificate
+from sealag.passivity import Answer, Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
 
@@ -99,52 +99,53 @@ def certify_project(
         show_json(certificate.summary())
     else:
         _show_certificate(certificate, path)
-    return 0 if certificate.status is Status.CERTIFIED else 1
+    return 0 if certificate.answer.status is Status.CERTIFIED else 1
 
 
-def _stability(certificate: Certificate) -> str:
+def _stability(answer: Answer) -> str:
     """Stability without delay, in words; a passive loop need not be stable."""
-    if certificate.unstable_modes:
-        count = certificate.unstable_modes
+    if answer.unstable_modes:
+        count = answer.unstable_modes
         return f"no: {count} unstable root{'s' * (count > 1)} without delay"
-    if certificate.stable is None:
+    if answer.stable is None:
         return "not known"
-    return "yes" if certificate.stable else "no"
+    return "yes" if answer.stable else "no"
 
 
 def _show_certificate(certificate: Certificate, path: Path) -> None:
-    worst = certificate.worst
+    question, answer = certificate.question, certificate.answer
+    worst = answer.worst
     shares = sorted(worst.direction.items(), key=lambda item: -item[1])
     limiting = ", ".join(f"{name} {share:.0%}" for name, share in shares[:3] if share >= 0.01)
-    verdict = certificate.status.value.replace("_", " ")
+    verdict = answer.status.value.replace("_", " ")
     rows = [
-        ("verdict", f"{verdict} ({certificate.criterion} criterion)"),
-        ("stable", _stability(certificate)),
-        ("largest delay", time_text(certificate.max_delay_s)),
-        ("delay of the design", time_text(certificate.delay_s)),
+        ("verdict", f"{verdict} ({question.criterion} criterion)"),
+        ("stable", _stability(answer)),
+        ("largest delay", time_text(answer.max_delay_s)),
+        ("delay of the design", time_text(question.delay_s)),
         (
             "worst instant",
-            f"{worst.instant} of {certificate.instants}, at {worst.time_s:.3f} s",
+            f"{worst.instant} of {question.instants}, at {worst.time_s:.3f} s",
         ),
         ("limiting joints", limiting),
-        ("exact local margin", time_text(certificate.local_margin_s)),
-        ("first crossing", time_text(certificate.first_crossing_s)),
-        ("published criterion says", time_text(certificate.published_max_delay_s)),
+        ("exact local margin", time_text(answer.local_margin_s)),
+        ("first crossing", time_text(answer.first_crossing_s)),
+        ("published criterion says", time_text(answer.published_max_delay_s)),
         ("certificate", str(path)),
     ]
-    if certificate.common_multiplier_delay_s is not None:
-        rows.insert(3, ("one multiplier for all", time_text(certificate.common_multiplier_delay_s)))
-    if certificate.time_varying_delay_s is not None:
-        rows.insert(4, ("time-varying matrices", time_text(certificate.time_varying_delay_s)))
+    if answer.common_multiplier_delay_s is not None:
+        rows.insert(3, ("one multiplier for all", time_text(answer.common_multiplier_delay_s)))
+    if answer.time_varying_delay_s is not None:
+        rows.insert(4, ("time-varying matrices", time_text(answer.time_varying_delay_s)))
     for name, value in rows:
         print(f"{name:26} {value}")
-    if certificate.status is Status.CERTIFIED and certificate.stable is not True:
+    if answer.status is Status.CERTIFIED and answer.stable is not True:
         print("passive but not stable: without further control the robot falls or drifts")
-    for reason in certificate.reasons:
+    for reason in answer.reasons:
         print(f"not certified because {reason}")
-    for bound, reason in certificate.left_open.items():
+    for bound, reason in answer.left_open.items():
         print(f"open whether {bound} is longer: {reason}")
-    for assumption in certificate.assumptions:
+    for assumption in answer.assumptions:
         print(f"assumed: {assumption.text}")
 
 

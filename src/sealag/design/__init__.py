@@ -1,30 +1,18 @@
 """The user's project file, motions in and out, and the certificate of a design."""
 
-from sealag.design._assumptions import assumptions_of
 from sealag.design._certify import certify, check_question
-from sealag.design._criteria import (
-    ASYMMETRY_TOLERANCE,
-    Bounds,
-    certified_bounds,
-    published_bounds,
-)
-from sealag.design._local import Local, local_of, margin_of
-from sealag.design._margins import LocalMargins, local_margins
+from sealag.design._criteria import certified_bounds
+from sealag.design._local import local_of, margin_of
+from sealag.design._margins import local_margins
 from sealag.design._motion_file import load_motion, motion_table, save_motion
 from sealag.design._project import load, parse_project, resolve_project
 from sealag.design._recheck import verify_design
 from sealag.design._simulate import scenario_duration, simulate
 from sealag.design._starter import starter_project
-from sealag.design._system import Source, System
+from sealag.design._system import System
 
 __all__ = [
-    "ASYMMETRY_TOLERANCE",
-    "Bounds",
-    "Local",
-    "LocalMargins",
-    "Source",
     "System",
-    "assumptions_of",
     "certified_bounds",
     "certify",
     "check_question",
@@ -35,7 +23,6 @@ __all__ = [
     "margin_of",
     "motion_table",
     "parse_project",
-    "published_bounds",
     "resolve_project",
     "save_motion",
     "scenario_duration",

@@ -1,4 +1,4 @@
-"""What a certificate takes for granted: one list, each with a key that stays the same."""
+"""Assumptions of a certificate: one list, each with a key that does not change."""
 
 from collections.abc import Iterator
 
@@ -15,10 +15,10 @@ from sealag.whole_body import GravityCompensation, Tank, TaskError
 def assumptions_of(
     system: System, motion: Motion, criterion: Criterion, local: Local
 ) -> tuple[Assumption, ...]:
-    """Return what a certificate of a design takes for granted.
+    """Return the assumptions of a design's certificate.
 
-    Whatever a design states that changes a run, but neither the bound nor the margin, stands here
-    by the name of its key.
+    Each entry of a design that changes a run, but neither the bound nor the margin, is listed here
+    by its key.
 
     Args:
         system: the design.
@@ -36,28 +36,29 @@ def _of_the_proof(
 ) -> Iterator[tuple[str, str]]:
     yield (
         "frozen_coefficients",
-        "J* and S are frozen at each instant, so that the multiplier may differ from instant to "
-        "instant; common_multiplier_delay_s is the bound with a single one.",
+        "J* and S are frozen at each instant, and each instant has a multiplier of its own; "
+        "common_multiplier_delay_s is the bound with a single one.",
     )
     if len(motion) > 1:
         yield (
             "instants",
-            "The motion's instants are checked, not what lies between them; each is taken as a "
+            "The motion is checked at its instants, not between them; each instant is a "
             "configuration that is held.",
         )
     if criterion is Criterion.PUBLISHED:
         yield (
             "published_criterion",
-            "The criterion is (29)/(31) as printed: it takes Λ K_x for symmetric, x(θ) for what is "
-            "fed back and gravity for not delayed, and can certify what is unstable.",
+            "The criterion is (29)/(31) as printed: it assumes that Λ K_x is symmetric, that x(θ) "
+            "is fed back and that gravity compensation is not delayed, and can certify an unstable "
+            "loop.",
         )
 
 
 def _of_stability(motion: Motion, local: Local) -> Iterator[tuple[str, str]]:
     yield (
         "passivity_is_not_stability",
-        "Passivity does not imply stability; see stable and local_margin_s, which are of the law "
-        "that runs, linearised where it rests, at constant delay.",
+        "Passivity does not imply stability; see stable and local_margin_s, which hold for the "
+        "law that runs, linearised where it rests, at constant delay.",
     )
     if len(motion) > 1:
         yield (
@@ -77,7 +78,7 @@ def _of_delays(system: System) -> Iterator[tuple[str, str]]:
         "delay_bound",
         f"d_1 is at most {time_text(delays.d_1)}, with the hold of a controller period of "
         f"{time_text(delays.sample_time)} (sample_time_ms; 1 ms where the design states none); it "
-        "may vary below that as it likes (order, "
+        "may vary below that in any way (order, "
         "phase_rad, angular_frequency_rad_s, time_s and period_s of the delays shape a run only).",
     )
     ways = {
@@ -93,19 +94,19 @@ def _of_delays(system: System) -> Iterator[tuple[str, str]]:
     if left_out:
         yield (
             "delay_quantile",
-            f"Later than the bound are {' and '.join(left_out)}: the quantile of the samples "
-            "leaves them out. For these nothing is certified.",
+            f"The quantile of the samples excludes {' and '.join(left_out)}: these are later than "
+            "the bound, and nothing is certified for them.",
         )
     yield (
         "one_delay",
-        "The ways up and down count by their sum d_1; d_2 delays the feedforward of a "
-        "moving reference (velocity_feedforward) and moves no root.",
+        "Only the sum d_1 of the ways up and down matters; d_2 delays the feedforward of a "
+        "moving reference (velocity_feedforward) and changes no root.",
     )
     if not delays.delayed_torque_feedback:
         yield (
             "torque_feedback",
-            "Motor damping and torque feedback act in the drives without delay; the way "
-            "embedded_up carries nothing that is fed back.",
+            "Motor damping and torque feedback act in the drives without delay; nothing on the "
+            "way embedded_up is fed back.",
         )
 
 
@@ -119,27 +120,27 @@ def _of_the_law(system: System) -> Iterator[tuple[str, str]]:
     if isinstance(law.signal, Tank):
         yield (
             "tank",
-            f"The energy tank pays for all that u does, with {law.signal.energy:g} J at the start; "
-            "u = 0 while it is empty. Stability is that of a tank that can pay.",
+            f"The energy tank supplies the power of u from {law.signal.energy:g} J at the start; "
+            "u = 0 while it is empty. Stability and margin hold while it is not empty.",
         )
     if len(law.levels(system.robot)) > 2:
         yield (
             "lower_tasks",
-            "A lower task's error is what the tasks above leave of it."
+            "A lower task's error is projected into the null space of the tasks above."
             if law.task_error is TaskError.CONSISTENT
-            else "Lower tasks feed back their whole errors, as printed.",
+            else "Lower tasks feed back their full errors, as printed.",
         )
     if system.robot.floating_base:
         yield (
             "base_motion",
-            "For the passive bound, motions of the base that the motors do not determine stand "
-            "still; the local margin contains them.",
+            "The passive bound assumes that base motions that the motors do not determine are at "
+            "rest; the local margin includes them.",
         )
     if system.walking is not None:
         yield (
             "walking",
-            "The law of [walking] (feet, steps, friction, terrain, gait, options) is another one; "
-            "nothing is said of it.",
+            "The law of [walking] (feet, steps, friction, terrain, gait, options) is a different "
+            "one and is not certified.",
         )
 
 
@@ -161,7 +162,7 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
         yield (
             "coulomb_friction",
             "Coulomb friction (coulomb_friction, or the URDF's friction, taken at the motor) only "
-            "dissipates; it leaves a static error, and the local margin is that of sliding motors.",
+            "dissipates; it leaves a static error, and the local margin assumes sliding motors.",
         )
     left_out = [
         name
@@ -176,7 +177,7 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
     if left_out:
         yield (
             "urdf_left_out",
-            f"The URDF's {', '.join(left_out)} is left out; actuators_of takes it over.",
+            f"The URDF's {', '.join(left_out)} is not used; actuators_of uses it.",
         )
     if (robot.effort_limit == 0.0).any() or (robot.velocity_limit == 0.0).any():
         zero = (robot.effort_limit == 0.0) | (robot.velocity_limit == 0.0)
@@ -189,7 +190,7 @@ def _of_contacts(system: System) -> Iterator[tuple[str, str]]:
         yield "contacts", "Contacts neither slip nor lift off."
     yield (
         "simulation",
-        "What [simulation] says sets a run, not the loop: scenario, duration_s, physics_step_ms, "
+        "[simulation] changes a run, not the loop: scenario, duration_s, physics_step_ms, "
         "seed, pushes (frame, force_n, start_s, duration_s), drop_height, track_amplitude, "
         "track_frequency_hz, and of the feet friction, foot_radius, foot_half_length, "
         "foot_half_width, torsional_damping and torsional_radius.",

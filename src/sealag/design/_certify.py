@@ -1,33 +1,33 @@
 """From a system and a motion to a certificate."""
 
 import sys
+from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 
 from sealag.design._assumptions import assumptions_of
-from sealag.design._criteria import Bounds, asymmetry, certified_bounds, published_bounds
-from sealag.design._evidence import (
-    Common,
-    Moving,
-    common_multiplier,
-    instant_proofs,
-    moving_multiplier,
-    refuted_delay,
-    stated_loop,
-    without,
-    without_bounds,
-    worst_motion,
+from sealag.design._criteria import (
+    certified_bounds,
+    common_bound,
+    delayed_stiffness,
+    prove_instants,
+    published_bounds,
+    stated_windows,
+    time_varying_bound,
 )
 from sealag.design._local import Local, local_of
 from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.passivity import (
+    Answer,
+    Bound,
     Certificate,
     Criterion,
     Critical,
-    LocalLoop,
+    Evidence,
+    InstantProof,
+    Question,
     Rest,
     Solver,
     Status,
@@ -38,10 +38,71 @@ from sealag.typing import Array
 from sealag.units import time_text
 from sealag.version import __version__
 from sealag.whole_body import Rest as Equilibrium
-from sealag.whole_body import Spaces
+from sealag.whole_body import Spaces, relative_asymmetry
 
 PROOF_COUNT = 12
 """Instants whose numbers a certificate holds if nothing else is asked for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Case:
+    """All that was computed for one certificate.
+
+    Attributes:
+        system: the design.
+        motion: its instants.
+        kind: the criterion.
+        spaces: the law's matrices.
+        F: (N, n, n) delayed stiffness of the criterion, Nm/rad.
+        bound: of each instant by the criterion, as far as it is proven.
+        published: of each instant by (29) or (31).
+        common: with one multiplier for the whole motion; None if it was not asked for.
+        time_varying: inside polytopes; None if it was not asked for.
+        proofs: of instants.
+        local: stability and local margin.
+        rest: where the loop rests; None for a motion.
+    """
+
+    system: System
+    motion: Motion
+    kind: Criterion
+    spaces: Spaces
+    F: Array
+    bound: Bound
+    published: Bound
+    common: Bound | None
+    time_varying: Bound | None
+    proofs: tuple[InstantProof, ...]
+    local: Local
+    rest: Equilibrium | None
+
+    @property
+    def worst(self) -> int:
+        """The instant with the smallest bound."""
+        return int(np.argmin(self.bound.delay))
+
+    @property
+    def max_delay(self) -> float:
+        """The smallest bound, s."""
+        return float(self.bound.delay[self.worst])
+
+    @property
+    def worst_motion(self) -> Array:
+        """Motor velocities y in the motion that first turns the delayed loop active, (n,) complex;
+        y* D_θ y = 1.
+        """
+        x = self.bound.worst_motion(self.worst)
+        return x / np.sqrt(self.system.actuators.motor_damping)
+
+    @property
+    def max_delay_upper(self) -> float:
+        """Delay above which the worst motion turns the loop active, y* D_θ y / |y* F y|, s."""
+        if not 0.0 < self.max_delay < np.inf:
+            return float(self.bound.upper[self.worst])
+        y = self.worst_motion
+        power = float(self.system.actuators.motor_damping @ np.abs(y) ** 2)
+        passed = max(float(abs(y.conj() @ self.F[self.worst] @ y)), 1e-300)
+        return power / passed * (1.0 + 1e-13)
 
 
 def certify(
@@ -86,54 +147,38 @@ def certify(
     rest = system.rest(motion) if len(motion) == 1 else None
     spaces = system.spaces(motion)
     published = published_bounds(spaces, system, solver=solver)
-    printed = kind is Criterion.PUBLISHED
     passive = certified_bounds(spaces, system, rest, motion)
-    bounds = published if printed else passive
-    shared = not printed and len(motion) > 1 and not bounds.reasons
-    common = common_multiplier(system, bounds, solver=solver) if shared else None
-    moving = None
-    if shared and time_varying:
-        moving = moving_multiplier(system, motion, bounds, solver=solver)
-    held, missing = instant_proofs(
-        system,
+    printed = kind is Criterion.PUBLISHED
+    bound, common, moving = published if printed else passive, None, None
+    if not printed and len(motion) > 1 and not bound.refusals:
+        common = common_bound(bound, solver=solver)
+        moving = time_varying_bound(bound, motion, solver=solver) if time_varying else None
+    proven, held = prove_instants(
         spaces,
-        bounds,
+        system,
+        bound,
         kind=kind,
         count=proofs,
         binding=common.binding if common else (),
         solver=solver,
     )
-    if missing:
-        bounds, common, moving = without(bounds, missing), None, None
-    decided = passive if kind is Criterion.CERTIFIED else without_bounds(passive)
-    local = local_of(system, motion, spaces, decided, rest)
-    return Certificate(
-        **_answer(
-            system,
-            spaces,
-            bounds,
-            kind=kind,
-            local=local,
-            rest=rest,
-            open_=_left_open(system, common, moving),
-        ),
-        **_at_worst(system, motion, bounds, local),
-        **_over_motion(motion, local),
-        **_shared(bounds, common, moving),
-        **design_entries(system),
-        instants=len(motion),
-        equilibrium=None if rest is None else Rest(found=rest.found, moved_rad=rest.moved),
-        published_max_delay_s=float((bounds if printed else published).delay.min()),
-        assumptions=assumptions_of(system, motion, kind, local),
-        time_s=motion.time.tolist(),
-        bounds_s=bounds.delay.tolist(),
+    withdrawn = proven is not bound
+    decided = np.zeros(len(motion)) if printed else passive.delay
+    case = _Case(
+        system=system,
+        motion=motion,
+        kind=kind,
+        spaces=spaces,
+        F=delayed_stiffness(spaces, system, kind),
+        bound=proven,
+        published=proven if printed else published,
+        common=None if withdrawn else common,
+        time_varying=None if withdrawn else moving,
         proofs=held,
-        versions={
-            "sealag": __version__,
-            "python": sys.version.split()[0],
-            **{name: version(name) for name in ("numpy", "scipy", "numba", "pin")},
-        },
+        local=local_of(system, motion, spaces, decided, rest),
+        rest=rest,
     )
+    return Certificate(question=_question(case), answer=_answer(case), evidence=_evidence(case))
 
 
 def check_question(
@@ -171,151 +216,149 @@ def check_question(
     return Criterion(name)
 
 
-def design_entries(system: System) -> dict[str, Any]:
-    """Return the entries of a certificate that come straight from the design.
+def _question(case: _Case) -> Question:
+    system, law, drives = case.system, case.system.law, case.system.actuators
+    return Question(
+        criterion=case.kind,
+        delay_s=system.delays.d_1,
+        joints=system.robot.joints,
+        instants=len(case.motion),
+        levels=tuple(law.levels(system.robot)),
+        feedback=law.signal.name,
+        gravity=law.gravity.value,
+        stiffness_form=law.stiffness_form.value,
+        task_inertia=law.task_inertia.value,
+        D_theta=drives.motor_damping,
+        spring_stiffness=drives.spring_stiffness,
+        spring_damping=drives.spring_damping,
+        viscous_friction=drives.viscous_friction,
+        motor_inertia=drives.shaped_inertia,
+        rotor_inertia=drives.rotor_inertia,
+        torque_bandwidth=tuple(_finite(value) for value in drives.torque_bandwidth),
+        hashes={"urdf": system.robot.urdf_sha256, "project": system.sha256},
+    )
 
-    Args:
-        system: the design.
-    """
-    law, drives = system.law, system.actuators
-    return {
-        "delay_s": system.delays.d_1,
-        "levels": law.levels(system.robot),
-        "feedback": law.signal.name,
-        "gravity": law.gravity.value,
-        "stiffness_form": law.stiffness_form.value,
-        "task_inertia": law.task_inertia.value,
-        "joints": system.robot.joints,
-        "D_theta": drives.motor_damping.tolist(),
-        "spring_stiffness": drives.spring_stiffness.tolist(),
-        "spring_damping": drives.spring_damping.tolist(),
-        "viscous_friction": drives.viscous_friction.tolist(),
-        "motor_inertia": drives.shaped_inertia.tolist(),
-        "rotor_inertia": drives.rotor_inertia.tolist(),
-        "torque_bandwidth": [_finite(value) for value in drives.torque_bandwidth],
-        "hashes": {
-            "urdf": system.robot.urdf_sha256,
-            "project": system.sha256,
+
+def _answer(case: _Case) -> Answer:
+    system, local, rest, worst = case.system, case.local, case.rest, case.worst
+    reasons = tuple(_reasons(case))
+    asymmetry = case.spaces.asymmetry
+    if case.kind is Criterion.PUBLISHED:
+        asymmetry = relative_asymmetry(case.F)
+    power = system.actuators.motor_damping * np.abs(case.worst_motion) ** 2
+    shares = (power / power.sum()).tolist()
+    return Answer(
+        status=Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
+        reasons=reasons,
+        max_delay_s=case.max_delay,
+        max_delay_upper_s=case.max_delay_upper,
+        worst=Worst(
+            instant=worst,
+            time_s=float(case.motion.time[worst]),
+            direction=dict(zip(system.robot.joints, shares, strict=True)),
+        ),
+        asymmetry=_finite(asymmetry.max()),
+        contraction=_finite(case.spaces.contraction.max()),
+        published_max_delay_s=float(case.published.delay.min()),
+        common_multiplier_delay_s=float(case.common.delay) if case.common else None,
+        time_varying_delay_s=float(case.time_varying.delay) if case.time_varying else None,
+        left_open=_left_open(case),
+        stable=local.stable,
+        unstable_modes=local.unstable_modes,
+        local_margin_s=local.margin_s,
+        critical=Critical(instant=local.critical, time_s=float(case.motion.time[local.critical])),
+        first_crossing_s=local.first_crossing_s,
+        equilibrium=None if rest is None else Rest(found=rest.found, moved_rad=rest.moved),
+        conservatism=_conservatism(local.margin_s, case.max_delay),
+        assumptions=assumptions_of(system, case.motion, case.kind, local),
+        versions={
+            "sealag": __version__,
+            "python": sys.version.split()[0],
+            **{name: version(name) for name in ("numpy", "scipy", "numba", "pin")},
         },
-    }
+    )
+
+
+def _evidence(case: _Case) -> Evidence:
+    y, moving = case.worst_motion, case.time_varying
+    W_moving = _stated_multiplier(moving)
+    windows = ()
+    if moving is not None and W_moving is not None:
+        windows = stated_windows(moving, case.system.actuators.motor_damping)
+    return Evidence(
+        time_s=case.motion.time,
+        bounds_s=tuple(case.bound.delay.tolist()),
+        instant_margins_s=tuple(
+            None if np.isnan(one.delay) else one.delay for one in case.local.instants
+        ),
+        instant_basis=tuple(one.basis for one in case.local.instants),
+        worst_motion=np.array([y.real, y.imag]),
+        proofs=case.proofs,
+        common_multiplier=_stated_multiplier(case.common),
+        time_varying_multiplier=W_moving,
+        time_varying_windows=windows,
+        local_loop=case.local.stated_loop(),
+    )
+
+
+def _stated_multiplier(bound: Bound | None) -> Array | None:
+    """The multiplier that proves a positive finite delay."""
+    if bound is None or not 0.0 < bound.delay < np.inf:
+        return None
+    return bound.multiplier
 
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _left_open(system: System, common: Common | None, moving: Moving | None) -> tuple[str, ...]:
-    """Bounds over the whole motion of which it is not known whether they cover the delay."""
-    parts = (("one multiplier", common), ("matrices that move", moving))
-    return tuple(
-        f"it is open whether the design's delay is proven with {what}: {found.left_open}"
-        for what, found in parts
-        if found and found.left_open and found.delay < system.delays.d_1
-    )
+def _conservatism(margin: float | None, bound: float) -> float | None:
+    known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
+    return margin / bound if margin is not None and known else None
 
 
-def _answer(
-    system: System,
-    spaces: Spaces,
-    bounds: Bounds,
-    *,
-    kind: Criterion,
-    local: Local,
-    rest: Equilibrium | None,
-    open_: tuple[str, ...],
-) -> dict[str, Any]:
-    """Status with its reasons, and what decides it."""
-    worst = int(np.argmin(bounds.delay))
-    max_delay_s, delay_s = float(bounds.delay[worst]), system.delays.d_1
-    reasons = list(bounds.reasons)
-    if not reasons and delay_s > max_delay_s:
-        solver = f"; a longer one is open: {bounds.left_open}" if bounds.left_open else ""
+def _left_open(case: _Case) -> dict[str, str]:
+    """Why a solver proved no longer delay, by the name of the bound."""
+    bounds = {
+        "max_delay_s": case.bound,
+        "common_multiplier_delay_s": case.common,
+        "time_varying_delay_s": case.time_varying,
+    }
+    return {name: bound.reason for name, bound in bounds.items() if bound and bound.reason}
+
+
+def _reasons(case: _Case) -> list[str]:
+    """Conditions that fail, delays that are too long, and bounds that decide nothing."""
+    bound, delay_s, largest = case.bound, case.system.delays.d_1, case.max_delay
+    reasons = list(bound.refusals)
+    if not reasons and delay_s > largest:
+        solver = f"; a longer one is open: {bound.reason}" if bound.reason else ""
         reasons.append(
             f"the design's delay of {time_text(delay_s)} exceeds the bound of "
-            f"{time_text(max_delay_s)}{solver}"
+            f"{time_text(largest)}{solver}"
         )
-    reasons += open_
-    if rest is not None and not rest.found:
-        reasons.append(f"the loop that holds the posture has no equilibrium: {rest.reason}")
-    if kind is Criterion.CERTIFIED and not reasons:
-        reasons += _undercut(local, bounds.delay)
-    return {
-        "status": Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
-        "criterion": kind,
-        "max_delay_s": max_delay_s,
-        "asymmetry": _finite(np.max(asymmetry(spaces, bounds, kind))),
-        "contraction": _finite(spaces.contraction.max()),
-        "reasons": tuple(reasons),
-    }
+    shared = (("one multiplier", case.common), ("matrices that move", case.time_varying))
+    reasons += [
+        f"it is open whether the design's delay is proven with {what}: {found.reason}"
+        for what, found in shared
+        if found and found.reason and found.delay < delay_s
+    ]
+    if case.rest is not None and not case.rest.found:
+        reasons.append(f"the loop that holds the posture has no equilibrium: {case.rest.reason}")
+    if case.kind is Criterion.CERTIFIED and not reasons:
+        reasons += _undercut(case)
+    return reasons
 
 
-def _undercut(local: Local, bounds: Array) -> list[str]:
+def _undercut(case: _Case) -> list[str]:
     """Where the law that runs loses a stability that it has, before its bound."""
-    lost = [k for k in local.undercut(bounds) if local.instants[k].delay > 0.0]
+    instants, bounds = case.local.instants, case.bound.delay
+    lost = [k for k in case.local.undercut(bounds) if instants[k].delay > 0.0]
     if not lost:
         return []
-    k = min(lost, key=lambda at: local.instants[at].delay)
+    k = min(lost, key=lambda at: instants[at].delay)
     return [
-        f"the law that runs loses its stability at {time_text(local.instants[k].delay)} at instant "
+        f"the law that runs loses its stability at {time_text(instants[k].delay)} at instant "
         f"{k}, before its bound of {time_text(float(bounds[k]))}: its matrices change where it "
         "rests with an error, or it answers to motions of the base, and no bound covers that"
     ]
-
-
-def _at_worst(system: System, motion: Motion, bounds: Bounds, local: Local) -> dict[str, Any]:
-    """The instant of the smallest bound: which, and its limiting direction."""
-    worst = int(np.argmin(bounds.delay))
-    y = worst_motion(system, bounds, worst)
-    power = system.actuators.motor_damping * np.abs(y) ** 2
-    margin, bound, upper = local.margin_s, float(bounds.delay[worst]), float(bounds.upper[worst])
-    if 0.0 < bound < np.inf:
-        upper = float(refuted_delay(system, bounds, worst, y)) * (1.0 + 1e-13)
-    known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
-    return {
-        "worst": Worst(
-            instant=worst,
-            time_s=float(motion.time[worst]),
-            direction=dict(zip(system.robot.joints, (power / power.sum()).tolist(), strict=True)),
-        ),
-        "max_delay_upper_s": upper,
-        "worst_motion": [y.real.tolist(), y.imag.tolist()],
-        "conservatism": margin / bound if margin is not None and known else None,
-    }
-
-
-def _over_motion(motion: Motion, local: Local) -> dict[str, Any]:
-    """Stability and local margin over all instants."""
-    at = local.critical
-    return {
-        "critical": Critical(instant=at, time_s=float(motion.time[at])),
-        "stable": local.stable,
-        "local_margin_s": local.margin_s,
-        "first_crossing_s": local.first_crossing_s,
-        "unstable_modes": local.unstable_modes,
-        "instant_margins_s": [None if np.isnan(one.delay) else one.delay for one in local.instants],
-        "instant_basis": [one.basis for one in local.instants],
-        "local_loop": _stated(local),
-    }
-
-
-def _stated(local: Local) -> LocalLoop | None:
-    return None if local.loop is None else stated_loop(local.loop, local.margin, local.at)
-
-
-def _shared(bounds: Bounds, common: Common | None, moving: Moving | None) -> dict[str, Any]:
-    """Multipliers for the whole motion, where they were asked for, and what solvers left open."""
-    open_ = {
-        "max_delay_s": bounds.left_open,
-        "common_multiplier_delay_s": common.left_open if common else "",
-        "time_varying_delay_s": moving.left_open if moving else "",
-    }
-    W_common = None if common is None or common.W is None else common.W.tolist()
-    W_moving = None if moving is None or moving.W is None else moving.W.tolist()
-    return {
-        "common_multiplier_delay_s": common.delay if common else None,
-        "common_multiplier": W_common,
-        "time_varying_delay_s": moving.delay if moving else None,
-        "time_varying_multiplier": W_moving,
-        "time_varying_windows": moving.windows if moving else (),
-        "left_open": {name: reason for name, reason in open_.items() if reason},
-    }

@@ -1,93 +1,68 @@
-"""The two criteria along a motion: certified (docs/theory section 6) and published ((29), (31))."""
+"""Bounds along a motion and their proofs, by the certified criterion (docs/theory section 6) and by
+the published one ((29), (31))."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from sealag import passivity
 from sealag.design._system import System
-from sealag.passivity import (
-    Criterion,
-    Solver,
-    max_delay,
-    max_delay_from_stiffness,
-    max_delay_multitask,
-)
+from sealag.errors import SolverError
+from sealag.passivity import Bound, Criterion, InstantProof, Problem, Solver, Window, solve
 from sealag.robot import Motion
 from sealag.typing import Array, BoolArray
 from sealag.units import time_text
-from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError, relative_asymmetry
+from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError
 
 ASYMMETRY_TOLERANCE = 1e-7
 """Relative asymmetry up to which a stiffness counts as symmetric: rounding, and the error of the
-central differences behind the gradient of gravity compensation."""
+central differences behind the gradient of gravity compensation. Ten times less refuses honest
+designs; ten times more is refused by `verify`."""
 
 PROOF_SHARE = 1.0 - 1e-7
-"""Delays are certified this far below their supremum, where a multiplier has room for rounding."""
+"""Delays are certified this far below their supremum, where a multiplier has room for rounding. Ten
+times closer, `verify` without --exact is in doubt; ten times further costs 1e-6 of the delay."""
+
+POLYTOPE_WIDTH = 20
+"""Intervals between instants in one window of the time-varying bound."""
 
 PUBLISHED_SHARE = 1.0 - 5e-7
-"""The same for (29) and (31), whose multipliers grow without end at the supremum where J* loses
+"""The same for (29) and (31), whose multipliers grow without bound at the supremum where J* loses
 rank."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
-    """A criterion's answer at every instant.
-
-    Attributes:
-        delay: (N,) s, 0 where a condition of the criterion fails.
-        upper: (N,) s, upper end of the bracket.
-        F: (N, n, n) the stiffness that the criterion uses, Nm/rad.
-        angle: (N,) angle at which its numerical radius is reached, rad.
-        reasons: which conditions fail, in words.
-        left_open: why a solver proved no longer delay at the worst instant; empty if it did its
-            part.
-    """
-
-    delay: Array
-    upper: Array
-    F: Array
-    angle: Array
-    reasons: tuple[str, ...]
-    left_open: str = ""
 
 
 def certified_bounds(
     spaces: Spaces, system: System, rest: Rest | None = None, motion: Motion | None = None
-) -> Bounds:
-    """Bound of docs/theory section 6 for the law that is run.
+) -> Bound:
+    """Bound every instant by the criterion of docs/theory section 6 for the law that is run.
 
     Sufficient for a passive controller side along the frozen motion: the signal is one that a
-    potential can belong to, the drives are ideal, the motors carry the static load, no direction is
-    lost that comes back beside the instant, the whole delayed stiffness F_θ is symmetric, the task
-    stiffness positive semidefinite, and d_1 ≤ 1 / w(D^-½ F_θ D^-½).
+    potential can belong to, the drives are ideal, the motors carry the static load, no contact or
+    task is singular, the whole delayed stiffness F_θ is symmetric, the task stiffness positive
+    semidefinite, and d_1 ≤ 1 / w(D^-½ F_θ D^-½).
 
     Args:
         spaces: the law's matrices.
         system: the design.
         rest: where the loop rests in its posture; None for a motion.
         motion: whose speeds the motors must reach; None for a posture.
+
+    Returns:
+        The bound of each instant, 0 where a condition fails.
     """
-    good, reasons = np.ones(len(spaces), dtype=bool), list[str]()
+    F = delayed_stiffness(spaces, system, Criterion.CERTIFIED)
+    problem = Problem.of_stiffness(F, system.actuators.motor_damping)
+    bound = solve(problem, share=passivity.Instant()).eased(PROOF_SHARE)
     for refused, words in _refusals(spaces, system, rest, motion):
-        if (good & refused).any():
-            reasons.append(words)
-            good &= ~refused
-    F = np.where(np.isfinite(spaces.F_theta), spaces.F_theta, 0.0)
-    bound = max_delay_from_stiffness(F, system.actuators.motor_damping)
-    return Bounds(
-        delay=np.where(good, PROOF_SHARE * bound.delay, 0.0),
-        upper=np.where(good, bound.upper, 0.0),
-        F=F,
-        angle=bound.angle,
-        reasons=tuple(reasons),
-    )
+        if (refused & (bound.delay > 0.0)).any():
+            bound = bound.refused(refused, words)
+    return bound
 
 
 def _refusals(
     spaces: Spaces, system: System, rest: Rest | None, motion: Motion | None
 ) -> Iterator[tuple[BoolArray, str]]:
-    """Instants (N,) at which the criterion does not hold, and why, in words."""
+    """Instants (N,) at which a condition of the criterion fails, and which, in words."""
     count, everywhere = len(spaces), np.ones(len(spaces), dtype=bool)
     signal = system.law.signal.refusal(spaces.contraction)
     if signal is not None:
@@ -101,7 +76,7 @@ def _refusals(
         yield (
             load > limit,
             (
-                f"the motor of {joint} gives at most {limit:g} Nm, and gravity asks for "
+                f"the motor of {joint} gives at most {limit:g} Nm, and gravity needs "
                 f"{load.max():.3g} Nm at {(load > limit).sum()} of {count} instants"
             ),
         )
@@ -111,16 +86,16 @@ def _refusals(
         yield (
             speed > limit,
             (
-                f"the motor of {joint} reaches at most {limit:g} rad/s or m/s, and the motion asks "
-                f"for {speed.max():.3g} at {(speed > limit).sum()} of {count} instants"
+                f"the motor of {joint} reaches at most {limit:g} rad/s or m/s, and the motion "
+                f"needs {speed.max():.3g} at {(speed > limit).sum()} of {count} instants"
             ),
         )
     yield (
         spaces.singular,
         (
-            f"contacts or tasks lose a direction at {spaces.singular.sum()} of {count} instants "
-            "that they have beside it, where the stiffness jumps; certify postures away from the "
-            "singularity"
+            f"contacts or tasks lose a direction at {spaces.singular.sum()} of {count} instants, "
+            "where the Jacobian is singular and the stiffness jumps; certify postures away from "
+            "the singularity"
         ),
     )
     bent = ~(spaces.asymmetry <= ASYMMETRY_TOLERANCE)
@@ -130,7 +105,7 @@ def _refusals(
             (
                 f"the fed-back stiffness is not symmetric at {bent.sum()} of {count} instants "
                 f"(asymmetry up to {spaces.asymmetry[bent].max():.2e}, from "
-                f"{_asymmetry_source(system)}), so that no potential belongs to it"
+                f"{_asymmetry_source(system)}), so that it has no potential"
             ),
         )
     negative = ~_semidefinite(spaces.F_task)
@@ -184,51 +159,142 @@ def task_stiffness(spaces: Spaces, system: System, kind: Criterion) -> Array:
     return spaces.Lambda @ spaces.K_x
 
 
-def asymmetry(spaces: Spaces, bounds: Bounds, kind: Criterion) -> Array:
-    """Return the relative asymmetry that a certificate states, (N,).
+def delayed_stiffness(spaces: Spaces, system: System, kind: Criterion) -> Array:
+    """Return the motor-side stiffness F that a criterion uses, (N, n, n), Nm/rad.
 
     Args:
         spaces: the law's matrices.
-        bounds: of the criterion.
-        kind: published states that of its own stiffness, certified that of what is fed back.
+        system: the design.
+        kind: certified takes that of the signal that is fed back, published J*ᵀ S J*.
     """
-    return relative_asymmetry(bounds.F) if kind is Criterion.PUBLISHED else spaces.asymmetry
+    if kind is Criterion.CERTIFIED:
+        return np.where(np.isfinite(spaces.F_theta), spaces.F_theta, 0.0)
+    S = task_stiffness(spaces, system, kind)
+    return np.swapaxes(spaces.J_star, -1, -2) @ S @ spaces.J_star
 
 
-def published_bounds(spaces: Spaces, system: System, *, solver: Solver | None = None) -> Bounds:
-    """Bound of (29), or of (31) for several priority levels, as printed.
+def published_bounds(spaces: Spaces, system: System, *, solver: Solver | None = None) -> Bound:
+    """Bound every instant by (29), or by (31) for several priority levels, as printed.
 
     Args:
         spaces: the law's matrices.
         system: the design.
         solver: where multipliers of several levels come from; Clarabel's own interface if None.
+
+    Returns:
+        The bound of each instant; of several levels the smallest one is as large as the solver
+        proves, and others at least 1/Σ w(A_i).
     """
-    D = system.actuators.motor_damping
-    form = system.law.stiffness_form.printed
-    levels = [spaces.level(k) for k in range(len(spaces.levels) - 1)]
-    S = task_stiffness(spaces, system, Criterion.PUBLISHED)
-    F = np.swapaxes(spaces.J_star, -1, -2) @ S @ spaces.J_star
-    whole = max_delay_from_stiffness(F, D)
-    if len(levels) == 1:
-        bound = max_delay(*levels[0], D, form=form)
-        return Bounds(
-            delay=PUBLISHED_SHARE * bound.delay,
-            upper=bound.upper,
-            F=F,
-            angle=bound.angle,
-            reasons=(),
-        )
-    many = max_delay_multitask(levels, D, form=form, solve=False)
-    delay, settled = np.array(many.delay), dict[int, str]()
-    while (k := int(np.argmin(delay))) not in settled:
-        one = [(J[k], Lambda[k], K_x) for J, Lambda, K_x in levels]
-        found = max_delay_multitask(one, D, form=form, solver=solver)
-        delay[k], settled[k] = max(delay[k], float(found.delay)), found.reason
-    return Bounds(
-        delay=PUBLISHED_SHARE * delay,
-        upper=many.upper,
-        F=F,
-        angle=whole.angle,
-        reasons=(),
-        left_open=settled[k],
+    problem = Problem.of_tasks(
+        spaces.J_star,
+        spaces.Lambda,
+        spaces.K_x,
+        system.actuators.motor_damping,
+        levels=spaces.levels,
+        form=system.law.stiffness_form.printed,
     )
+    bound = solve(problem, share=passivity.Instant(every=False), solver=solver)
+    return bound.eased(PUBLISHED_SHARE)
+
+
+def common_bound(bound: Bound, *, solver: Solver | None = None) -> Bound:
+    """Bound a motion with one multiplier for all its instants, as V_4 needs it.
+
+    Args:
+        bound: of the certified criterion.
+        solver: where multipliers come from; Clarabel's own interface if None.
+    """
+    return solve(bound.problem, share=passivity.Motion(), solver=solver).eased(PROOF_SHARE)
+
+
+def time_varying_bound(bound: Bound, motion: Motion, *, solver: Solver | None = None) -> Bound:
+    """Bound stiffnesses that vary as they like inside polytopes around a motion.
+
+    Args:
+        bound: of the certified criterion.
+        motion: its instants; no window reaches across a change of contacts.
+        solver: where multipliers come from; Clarabel's own interface if None.
+    """
+    breaks = np.flatnonzero(np.diff(motion.contact_index)) + 1
+    share = passivity.Windows(width=POLYTOPE_WIDTH, breaks=breaks.tolist())
+    return solve(bound.problem, share=share, solver=solver).eased(PROOF_SHARE)
+
+
+def stated_windows(bound: Bound, D_theta: Array) -> tuple[Window, ...]:
+    """Return the polytopes of a time-varying bound in Nm/rad.
+
+    Args:
+        bound: from `time_varying_bound`.
+        D_theta: (n,) motor damping, Nms/rad.
+    """
+    root = np.sqrt(D_theta)[:, None]
+    found = []
+    for one in bound.windows:
+        centre, *axes = root * one.M
+        kept = [axis for axis in axes if axis.any()]
+        found.append(
+            Window(
+                first=one.first,
+                last=one.last,
+                centre=centre,
+                axes=np.array(kept).reshape(-1, *centre.shape),
+                radius=one.radius,
+            )
+        )
+    return tuple(found)
+
+
+def prove_instants(
+    spaces: Spaces,
+    system: System,
+    bound: Bound,
+    *,
+    kind: Criterion,
+    count: int | None,
+    binding: tuple[int, ...] = (),
+    solver: Solver | None = None,
+) -> tuple[Bound, tuple[InstantProof, ...]]:
+    """Prove the smallest bounds, and those that bind a shared multiplier.
+
+    Args:
+        spaces: the law's matrices.
+        system: the design.
+        bound: of the criterion.
+        kind: which criterion.
+        count: how many of the smallest bounds; None for all.
+        binding: instants that bind the common multiplier.
+        solver: where multipliers of several levels come from; Clarabel's own interface if None.
+
+    Returns:
+        The bound, withdrawn where no proof was found, and the proofs.
+    """
+    S, F = task_stiffness(spaces, system, kind), delayed_stiffness(spaces, system, kind)
+    usable = (bound.delay > 0.0) & np.isfinite(bound.delay)
+    order = np.argsort(bound.delay, kind="stable")
+    smallest = order[usable[order]][:count].tolist()
+    extra = [k for k in binding if usable[k] and k not in set(smallest)]
+    proofs, missing = [], dict[int, str]()
+    for k in (*smallest, *extra):
+        try:
+            W = bound.prove(k, solver=solver).blocks
+        except SolverError as error:
+            missing[k] = str(error)
+            continue
+        d = float(bound.delay[k])
+        proofs.append(
+            InstantProof(
+                instant=k,
+                delay_s=d,
+                J_star=spaces.J_star[k],
+                stiffness=S[k],
+                F_gravity=spaces.F_gravity[k],
+                F=F[k],
+                W=W,
+                Q=tuple(block / d for block in W),
+            )
+        )
+    if missing:
+        first = min(missing)
+        words = f"{len(missing)} of {len(F)} bounds have no proof, instant {first}: "
+        bound = bound.refused(list(missing), words + missing[first])
+    return bound, tuple(proofs)

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.design._criteria import ASYMMETRY_TOLERANCE, Bounds
+from sealag.design._criteria import ASYMMETRY_TOLERANCE
 from sealag.design._system import System
 from sealag.errors import ContractionError, SolverError
 from sealag.margin import DelayMargin, delay_margin
-from sealag.passivity import Basis, Place
+from sealag.passivity import Basis, LocalLoop, Place
 from sealag.robot import Motion
 from sealag.typing import Array
 from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, Spaces, sea_loop
@@ -17,16 +17,21 @@ MOST_EXACT = 600
 """Instants of a motion that are decided exactly at most; a bound decides the others, or none."""
 
 _FEW = 50  # instants up to which all are decided, also once one is known to be unstable
-_AT_REST = 1e-7  # share of weight and torques that springs and contacts may leave over at a posture
-_MINIMUM = 1e-9  # share of the largest curvature above which a potential has a strict minimum
+_AT_REST = 1e-7
+"""Share of weight and torques that may be unbalanced in a posture that counts as at rest. Ten times
+less loses postures of stiff contacts; ten times more takes sagging ones for equilibria."""
+
+_MINIMUM = 1e-9
+"""Share of the largest curvature above which a potential has a strict minimum. Ten times less is
+rounding; ten times more sends soft but stable postures to the exact decision."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InstantMargin:
-    """What is known of one instant.
+    """Margin of one instant.
 
     Attributes:
-        basis: how it is known.
+        basis: what the margin rests on.
         delay: margin or its lower bound, s; NaN if open.
         unstable_roots: roots not in the open left half-plane without delay; 0 if open.
     """
@@ -44,13 +49,13 @@ class Local:
     """Stability over a motion.
 
     Attributes:
-        instants: what is known of each instant.
+        instants: margin of each instant.
         critical: the instant with the smallest margin; of those unstable without delay the one with
             most unstable roots.
         margin: its exact margin; None if none could be decided.
         loop: its frozen loop; None where the law has none.
         at: where that is frozen.
-        rest: where it rests; None if it was not looked for.
+        rest: its equilibrium; None if it was not searched.
         problem: why the critical instant has no margin, in words; empty if it has.
     """
 
@@ -87,6 +92,24 @@ class Local:
             return None
         return float(self.margin.first_crossing)
 
+    def stated_loop(self) -> LocalLoop | None:
+        """Return the frozen loop of the critical instant as a certificate states it."""
+        loop, margin = self.loop, self.margin
+        if loop is None:
+            return None
+        crosses = margin is not None and np.isfinite(margin.frequency)
+        late = bool(loop.A_e.any()) and loop.embedded_delay > 0.0
+        return LocalLoop(
+            states=tuple(loop.states),
+            A_0=loop.A_0 if late else loop.A_0 + loop.A_e,
+            A_1=loop.A_1,
+            A_e=loop.A_e if late else None,
+            embedded_delay_s=loop.embedded_delay if late else 0.0,
+            symmetries=loop.symmetries / np.linalg.norm(loop.symmetries, axis=0),
+            at=self.at,
+            frequency_rad_s=float(margin.frequency) if margin is not None and crosses else None,
+        )
+
     def undercut(self, bounds: Array) -> list[int]:
         """Return the instants whose exact margin lies below their bound.
 
@@ -109,24 +132,23 @@ class Local:
 
 
 def local_of(
-    system: System, motion: Motion, spaces: Spaces, bounds: Bounds, rest: Rest | None = None
+    system: System, motion: Motion, spaces: Spaces, bounds: Array, rest: Rest | None = None
 ) -> Local:
     """Decide stability and margin of the law that runs at every instant of a motion.
 
     Each instant is a loop that holds the instant's configuration. It is frozen in that
-    configuration and, where the law sags, where it rests with the references as they are; the
-    smaller margin counts. An instant of a motion that is unstable in its configuration is not
-    looked at elsewhere. Where the law has a potential, rests at the instant itself, joints
-    determine all motions and the drives are ideal, a strict minimum of the potential is stable
-    without delay, and the passive bound lies below the margin (V̇ ≤ 0 for delays up to it): such an
-    instant is decided exactly only if its bound lies below the smallest margin known. All others
-    are decided exactly, up to MOST_EXACT.
+    configuration and, where the law sags, also in its equilibrium; the smaller margin counts. An
+    instant of a motion that is unstable in its configuration is not frozen elsewhere. Where the law
+    has a potential, rests at the instant itself, joints determine all motions and the drives are
+    ideal, a strict minimum of the potential is stable without delay, and the passive bound does not
+    exceed the margin (V̇ ≤ 0 for delays up to it): such an instant is decided exactly only if its
+    bound lies below the smallest margin so far. All others are decided exactly, up to MOST_EXACT.
 
     Args:
         system: the design.
         motion: its instants.
         spaces: the law's matrices along it.
-        bounds: of the certified criterion.
+        bounds: (N,) of the certified criterion, s; 0 where it decides nothing.
         rest: where the loop of the first instant rests, if that is known already.
     """
     return _Decision(system, motion, spaces, bounds, rest).run()
@@ -134,7 +156,7 @@ def local_of(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Known:
-    """What is known of one frozen loop."""
+    """One frozen loop and its margin, as far as it was decided."""
 
     margin: DelayMargin | None
     loop: FrozenLoop | None
@@ -154,19 +176,19 @@ class _Known:
         return None if self.margin is None else float(self.margin.delay)
 
     def order(self) -> tuple[float, int]:
-        """Smallest margin first, of zeros the most unstable, what is not known last."""
+        """Sort the smallest margin first, of zeros the most unstable, an undecided one last."""
         return (np.inf if self.delay is None else self.delay), -self.roots
 
 
 class _Decision:
-    """What is known so far."""
+    """The decision over a motion, instant by instant."""
 
     def __init__(
         self,
         system: System,
         motion: Motion,
         spaces: Spaces,
-        bounds: Bounds,
+        bounds: Array,
         first: Rest | None,
     ) -> None:
         self._system, self._motion, self._spaces, self._bounds = system, motion, spaces, bounds
@@ -182,14 +204,14 @@ class _Decision:
             if self._decide(int(k)) and count > _FEW:
                 break
         for k in minima:
-            delay = float(self._bounds.delay[k])
+            delay = float(self._bounds[k])
             self._found[k] = InstantMargin(basis=Basis.BOUND, delay=delay)
-        for k in sorted(minima, key=lambda at: float(self._bounds.delay[at])):
-            if self._best is not None and self._bounds.delay[k] >= self._least():
+        for k in sorted(minima, key=lambda at: float(self._bounds[at])):
+            if self._best is not None and self._bounds[k] >= self._least():
                 break
             self._search(k, minima[k])
         if self._best is None:  # no search came to an end
-            self._decide(min(minima, key=lambda at: float(self._bounds.delay[at])))
+            self._decide(min(minima, key=lambda at: float(self._bounds[at])))
         assert self._best is not None
         return Local(
             instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
@@ -201,7 +223,7 @@ class _Decision:
         return np.inf if self._best is None or self._best.delay is None else self._best.delay
 
     def _search(self, k: int, links: FreeLinks) -> None:
-        """Look for crossings of a loop at a minimum that come before the smallest margin known."""
+        """Search a loop at a minimum for crossings below the smallest margin so far."""
         least, robot = self._least(), self._system.robot
         loop = sea_loop(
             self._system.actuators,
@@ -249,7 +271,7 @@ class _Decision:
         return unstable
 
     def _at(self, k: int, at: Place, state: Rest) -> "_Known":
-        """What is known of the loop of an instant, frozen at a state."""
+        """The loop of an instant, frozen at a state, and its margin."""
         loop, margin, problem = None, None, state.reason
         try:
             loop = self._system.frozen(self._motion, k, rest=state)
@@ -261,7 +283,7 @@ class _Decision:
     def _minima(self) -> dict[int, FreeLinks]:
         """Links at the instants that a potential decides: stable, with a margin above the bound."""
         system, spaces = self._system, self._spaces
-        good = (self._bounds.delay > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
+        good = (self._bounds > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
         if not (system.law.rests_at_posture and system.ideal_drives):
             return {}
         plants = [LinkPlant(system.robot, contacts) for contacts in self._motion.contact_sets]
@@ -296,7 +318,7 @@ def margin_of(loop: FrozenLoop, **choices: object) -> DelayMargin:
 
     Args:
         loop: the loop.
-        choices: what `delay_margin` may be asked besides.
+        choices: further arguments of `delay_margin`.
     """
     return delay_margin(
         loop.A_0,

@@ -28,8 +28,8 @@ class LocalMargins:
         frequency_rad_s: frequency of that pair, rad/s; None without one.
         mode: share of each joint's motor in that pair's motion.
         unstable_modes: roots with positive real part without delay, at that instant.
-        neutral: structural zero roots there.
-        equilibrium: whether the loop rests there, or why it does not.
+        neutral: zero roots by symmetry at that instant.
+        equilibrium: "found", or why the loop has none.
         instant: index of that instant.
         time_s: its time, s.
         instants: number of instants of the motion.
@@ -77,11 +77,10 @@ def local_margins(
 ) -> LocalMargins:
     """Decide the exact local margin of the law that runs, over all instants of a motion.
 
-    Necessary and sufficient for local stability at constant delay with frozen coefficients, where
-    the loop that holds an instant rests. The delay is d_1, the sum of all ways around the loop,
-    however it is split; torque feedback that the design delays in its drives has that delay of its
-    own besides. Of the instants that a potential decides only those are computed whose passive
-    bound lies below the smallest margin; the others lie above it.
+    Necessary and sufficient for local stability at constant delay with frozen coefficients, at the
+    equilibrium of the loop that holds an instant. The delay is d_1, the sum of all ways around the
+    loop; delayed torque feedback in the drives has a delay of its own. Instants that a potential
+    decides are computed only where their passive bound lies below the smallest margin.
 
     Args:
         system: the design.
@@ -97,7 +96,8 @@ def local_margins(
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
     motion = system.still() if motion is None else motion
     spaces = system.spaces(motion)
-    local = local_of(system, motion, spaces, certified_bounds(spaces, system, None, motion))
+    bounds = certified_bounds(spaces, system, None, motion).delay
+    local = local_of(system, motion, spaces, bounds)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
         raise ContractionError(local.problem)

@@ -1,23 +1,31 @@
-"""Checking a certificate against the design that it is said to be of."""
+"""Checking a certificate against the design that it names."""
 
-import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sealag.design._certify import certify
-from sealag.design._criteria import certified_bounds, published_bounds
+from sealag.design._criteria import delayed_stiffness
 from sealag.design._system import System
 from sealag.errors import InputError
-from sealag.passivity import Check, Criterion, Verification, read_certificate, verify
+from sealag.passivity import (
+    Certificate,
+    Check,
+    InstantProof,
+    LocalLoop,
+    Verification,
+    read_certificate,
+    verify,
+)
 from sealag.robot import Motion
 from sealag.typing import Array
 
 AGREEMENT = 1e-6
-"""Relative difference up to which recomputed numbers agree: another machine rounds in another way,
-and bounds are brackets of that width."""
+"""Relative difference up to which recomputed numbers agree: machines round differently, and bounds
+are brackets of that width. Ten times less accuses other machines; ten times more hides a change in
+the sixth digit."""
 
 _PROBES = np.array([0.3 + 1.0j, 1.0 + 1.0j, 3.0 + 10.0j])
 """Places right of the axis, as multiples of the crossing's frequency, where loops are compared."""
@@ -27,12 +35,12 @@ _NOT_UNIQUE = frozenset(
      "proofs", "worst_motion", "versions", "hashes", "common_multiplier_delay_s",
      "time_varying_delay_s", "conservatism"}
 )  # fmt: skip
-"""Fields that more than one value can be right for: coordinates and multipliers may be chosen, and
-solvers end where they end. `verify` checks them from the file; what follows checks the rest."""
+"""Fields with more than one right value: coordinates and multipliers are a choice, and solvers stop
+at different points. `verify` checks them from the file; the checks below compare the rest."""
 
 
 def verify_design(
-    certificate: Path | str | dict[str, Any],
+    certificate: Path | str | Mapping[str, Any],
     system: System,
     motion: Motion | None = None,
     *,
@@ -48,7 +56,7 @@ def verify_design(
     from them.
 
     Args:
-        certificate: a file, or what `read_certificate` returns.
+        certificate: a file, or the plain data in it.
         system: the design.
         motion: the motion that was certified; the system's posture if None.
         exact: decide definiteness in rational arithmetic.
@@ -62,42 +70,39 @@ def verify_design(
         RobotError: a mass matrix is not positive definite.
     """
     found = verify(certificate, exact=exact)
-    data = certificate if isinstance(certificate, dict) else read_certificate(Path(certificate))
-    if motion is None and data["instants"] > 1:
-        raise InputError(
-            f"The certificate is of a motion of {data['instants']} instants; name it (--motion)."
-        )
+    claimed = read_certificate(certificate)
+    count = claimed.question.instants
+    if motion is None and count > 1:
+        raise InputError(f"The certificate is of a motion of {count} instants; name it (--motion).")
     checks = found.checks
     if found.valid:
-        checks += tuple(_recomputed(data, system, motion))
+        checks += tuple(_recomputed(claimed, system, motion))
     return Verification(exact=exact, checks=checks)
 
 
-def _recomputed(data: dict[str, Any], system: System, motion: Motion | None) -> Iterator[Check]:
+def _recomputed(claimed: Certificate, system: System, motion: Motion | None) -> Iterator[Check]:
     """What follows from robot, project and motion."""
-    anew = certify(system, motion, criterion=data["criterion"], proofs=max(len(data["proofs"]), 1))
-    fresh = json.loads(json.dumps(anew.to_json_dict()))
-    for name in ("urdf", "project"):
-        same = data["hashes"].get(name) == fresh["hashes"][name]
+    proofs, kind = claimed.evidence.proofs, claimed.question.criterion
+    fresh = certify(system, motion, criterion=kind, proofs=max(len(proofs), 1))
+    for name, digest in fresh.question.hashes.items():
+        same = claimed.question.hashes.get(name) == digest
         words = "the file's SHA-256" if same else f"the certificate is of another {name} file"
         yield Check(name=f"{name} file", ok=same, detail=words)
-    for name, value in fresh.items():
+    data = claimed.to_json_dict()
+    for name, value in fresh.to_json_dict().items():
         if name not in _NOT_UNIQUE:
             where = _difference(data[name], value)
             words = where.removeprefix(":").strip() or "as computed anew"
             yield Check(name=f"design: {name}", ok=not where, detail=words)
-    yield _versions(data["versions"], fresh["versions"])
-    if data["time_s"] != fresh["time_s"]:
+    yield _versions(claimed.answer.versions, fresh.answer.versions)
+    if not np.array_equal(claimed.evidence.time_s, fresh.evidence.time_s):
         return
-    spaces = system.spaces(motion)
-    printed = Criterion(data["criterion"]) is Criterion.PUBLISHED
-    bounds = (published_bounds if printed else certified_bounds)(spaces, system)
-    held = {proof["instant"]: proof for proof in fresh["proofs"]}
-    for proof in data["proofs"]:
-        yield _matrices(proof, held.get(proof["instant"]), bounds.F[proof["instant"]])
-    if data["common_multiplier"] is not None:
-        yield _common(data, bounds.F)
-    yield _loop(data["local_loop"], fresh["local_loop"])
+    F = delayed_stiffness(system.spaces(motion), system, kind)
+    for proof in proofs:
+        yield _matrices(proof, fresh.evidence.proof_of(proof.instant), F[proof.instant])
+    if claimed.evidence.common_multiplier is not None:
+        yield _common(claimed, claimed.evidence.common_multiplier, F)
+    yield _loop(claimed.evidence.local_loop, fresh.evidence.local_loop)
 
 
 def _difference(claimed: Any, found: Any, where: str = "") -> str:
@@ -121,21 +126,28 @@ def _agrees(claimed: Any, found: Any) -> bool:
     return type(claimed) is type(found) and claimed == found
 
 
-def _matrices(proof: dict[str, Any], fresh: dict[str, Any] | None, F: Array) -> Check:
-    name = f"design: J*, S, F at instant {proof['instant']}"
-    pairs = {"F": F.tolist()}
+def _matrices(claimed: InstantProof, fresh: InstantProof | None, F: Array) -> Check:
+    pairs = [(claimed.F, F)]
     if fresh is not None:
-        pairs |= {key: fresh[key] for key in ("J_star", "stiffness", "F_gravity")}
-    gaps = []
-    for key, value in pairs.items():
-        claimed, found = np.array(proof[key]), np.array(value)
-        size = max(float(np.abs(found).max(initial=0.0)), 1e-300)
-        fits = claimed.shape == found.shape
-        gaps.append(float(np.abs(claimed - found).max(initial=0.0)) / size if fits else np.inf)
-    return Check(name=name, ok=max(gaps) <= AGREEMENT, detail=f"to {max(gaps):.1e}")
+        pairs += [
+            (claimed.J_star, fresh.J_star),
+            (claimed.stiffness, fresh.stiffness),
+            (claimed.F_gravity, fresh.F_gravity),
+        ]
+    gap = max(_gap(one, other) for one, other in pairs)
+    name = f"design: J*, S, F at instant {claimed.instant}"
+    return Check(name=name, ok=gap <= AGREEMENT, detail=f"to {gap:.1e}")
 
 
-def _versions(claimed: dict[str, str], here: dict[str, str]) -> Check:
+def _gap(claimed: Array, found: Array) -> float:
+    """Largest difference over the largest entry; inf for other shapes."""
+    if claimed.shape != found.shape:
+        return np.inf
+    size = max(float(np.abs(found).max(initial=0.0)), 1e-300)
+    return float(np.abs(claimed - found).max(initial=0.0)) / size
+
+
+def _versions(claimed: Mapping[str, str], here: Mapping[str, str]) -> Check:
     """Another sealag answers in its own way; other libraries round in another way, and may."""
     same = set(claimed) == set(here) and claimed["sealag"] == here["sealag"]
     others = [f"{name} {v}" for name, v in claimed.items() if v != here.get(name)]
@@ -143,50 +155,52 @@ def _versions(claimed: dict[str, str], here: dict[str, str]) -> Check:
     return Check(name="design: versions", ok=same, detail=words)
 
 
-def _loop(claimed: dict[str, Any] | None, fresh: dict[str, Any] | None) -> Check:
+def _loop(claimed: LocalLoop | None, fresh: LocalLoop | None) -> Check:
     """The frozen loop, whatever the coordinates z: what torques of motors and drives do to them."""
     name = "design: local_loop"
     if claimed is None or fresh is None:
         words = "none" if fresh is None else "it has one"
         return Check(name=name, ok=claimed is fresh, detail=words)
-    for key in ("at", "states", "frequency_rad_s", "embedded_delay_s"):
-        if where := _difference(claimed[key], fresh[key], f"local_loop.{key}"):
+    pairs = (
+        ("at", claimed.at, fresh.at),
+        ("states", list(claimed.states), list(fresh.states)),
+        ("frequency_rad_s", claimed.frequency_rad_s, fresh.frequency_rad_s),
+        ("embedded_delay_s", claimed.embedded_delay_s, fresh.embedded_delay_s),
+    )
+    for key, one, other in pairs:
+        if where := _difference(one, other, f"local_loop.{key}"):
             return Check(name=name, ok=False, detail=where)
-    if (claimed["A_e"] is None) != (fresh["A_e"] is None):
+    if (claimed.A_e is None) != (fresh.A_e is None):
         return Check(name=name, ok=False, detail="A_e is there in one of both only")
-    gaps = []
-    for s in _PROBES * (fresh["frequency_rad_s"] or 10.0):
-        found, wanted = (_answers(loop, s) for loop in (claimed, fresh))
-        gaps.append(float(np.abs(found - wanted).max() / np.abs(wanted).max()))
-    words = f"motors answer to torques as computed anew, to {max(gaps):.1e}"
-    return Check(name=name, ok=max(gaps) <= AGREEMENT, detail=words)
+    gap = max(
+        _gap(_answers(claimed, s), _answers(fresh, s))
+        for s in _PROBES * (fresh.frequency_rad_s or 10.0)
+    )
+    words = f"motors answer to torques as computed anew, to {gap:.1e}"
+    return Check(name=name, ok=gap <= AGREEMENT, detail=words)
 
 
-def _answers(loop: dict[str, Any], s: complex) -> Array:
+def _answers(loop: LocalLoop, s: complex) -> Array:
     """Motors, drives and tank (m, m) under forces on their rates, at s with both delays at 1/|s|.
 
     A_0 and A_1 answer apart, so that neither can hide in the other.
     """
-    kept = [k for k, name in enumerate(loop["states"]) if not name.startswith(("z", "d/dt z"))]
-    A_0, A_1 = np.array(loop["A_0"]), np.array(loop["A_1"])
-    A_e = 0.0 if loop["A_e"] is None else np.array(loop["A_e"])
+    kept = [k for k, name in enumerate(loop.states) if not name.startswith(("z", "d/dt z"))]
     late = np.exp(-s / abs(s))
-    whole = [A_0, A_0 + late * A_1, A_0 + late * A_e]
-    answers = [np.linalg.inv(s * np.eye(len(A_0)) - A)[np.ix_(kept, kept)] for A in whole]
+    A_e = 0.0 if loop.A_e is None else loop.A_e
+    whole = [loop.A_0, loop.A_0 + late * loop.A_1, loop.A_0 + late * A_e]
+    answers = [np.linalg.inv(s * np.eye(len(A)) - A)[np.ix_(kept, kept)] for A in whole]
     return np.stack(answers)
 
 
-def _common(data: dict[str, Any], F: Array) -> Check:
+def _common(claimed: Certificate, W: Array, F: Array) -> Check:
     """[[2D − W, dF], [dFᵀ, W]] at every instant, in doubles."""
-    d, W = data["common_multiplier_delay_s"], np.array(data["common_multiplier"])
+    d, D = claimed.answer.common_multiplier_delay_s, claimed.question.D_theta
     whole = np.broadcast_to(W, F.shape)
-    corner = 2.0 * np.diag(data["D_theta"]) - whole
-    rows = [np.concatenate([corner, d * F], axis=2)]
-    rows.append(np.concatenate([d * np.swapaxes(F, 1, 2), whole], axis=2))
-    lowest = np.linalg.eigvalsh(np.concatenate(rows, axis=1))[:, 0]
-    room = AGREEMENT * max(data["D_theta"])
+    corner = np.broadcast_to(2.0 * np.diag(D) - W, F.shape)
+    lowest = np.linalg.eigvalsh(np.block([[corner, d * F], [d * np.swapaxes(F, 1, 2), whole]]))
     return Check(
         name=f"design: common multiplier at all {len(F)} instants",
-        ok=bool((lowest >= -room).all()),
-        detail=f"lowest eigenvalue {lowest.min():.3e}",
+        ok=bool((lowest[:, 0] >= -AGREEMENT * D.max()).all()),
+        detail=f"lowest eigenvalue {lowest[:, 0].min():.3e}",
     )

@@ -11,7 +11,6 @@ from sealag.design._criteria import certified_bounds
 from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
 from sealag.errors import InputError, either
-from sealag.passivity import joint_multiplier
 from sealag.robot import ContactKind
 from sealag.simulation import (
     Clock,
@@ -135,11 +134,11 @@ def _with_delay_storage(run: Run, system: System, q: Array) -> Run:
     if run.audit.controller_side is None or len(run.time) < 3:
         return run
     motion = replace(system.still(), q=q[None])
-    bounds = certified_bounds(system.spaces(motion), system)
-    delay = float(bounds.delay[0])
+    bound = certified_bounds(system.spaces(motion), system)
+    delay = float(bound.delay[0])
     if not 0.0 < delay < math.inf:
         return run
-    Y = joint_multiplier(bounds.F[0], system.actuators.motor_damping, delay)
+    (Y,) = bound.prove(0).blocks
     stored, error = run.delay_storage(Y, delay=delay)
     audit = replace(run.audit, delay_storage=stored, delay_storage_error=error)
     return replace(run, audit=audit)

@@ -1,108 +1,54 @@
-"""Passivity criteria: how much delay a design tolerates, and the proof of it."""
+"""Passivity criteria: how much delay a design tolerates, and the proof of it.
 
-from sealag.passivity._bounds import (
-    DelayBound,
-    limiting_direction,
-    max_delay,
-    max_delay_from_stiffness,
-)
-from sealag.passivity._certificate import (
-    Assumption,
-    Basis,
-    Certificate,
-    Criterion,
-    Critical,
-    LocalLoop,
-    Place,
-    Proof,
-    Rest,
-    Status,
-    Window,
-    Worst,
-    content_digest,
-    write_certificate,
-)
+`solve` answers a `Problem` with a `Bound`, for a multiplier that each `Instant`, a whole `Motion`
+or polytopes in `Windows` share. A `Certificate` is question, answer and evidence; `verify` checks
+it from its own numbers, without the code that made it.
+"""
+
+from sealag.passivity._bound import Bound
+from sealag.passivity._certificate import Certificate, write_certificate
 from sealag.passivity._checks import Check, Verification
-from sealag.passivity._common import (
-    CommonBound,
-    max_delay_common,
-    max_delay_common_from_stiffness,
-)
-from sealag.passivity._multipliers import TaskMultiplier, joint_multiplier, task_multiplier
-from sealag.passivity._multitask import MultitaskBound, max_delay_multitask
-from sealag.passivity._polytope import (
-    PolytopeBound,
-    max_delay_polytope,
-    max_delay_polytope_from_stiffness,
-)
-from sealag.passivity._problem import (
-    Factor,
-    MultiplierProblem,
-    Solution,
-    factorise,
-    proven_delays,
-    refuted_delay,
-)
-from sealag.passivity._reading import read_certificate
-from sealag.passivity._solvers import ClarabelCvxpy, ClarabelDirect, ClosedForm, Solver
-from sealag.passivity._storage import (
-    DelayStorage,
-    delay_storage,
-    link_storage,
-    motor_storage,
-    task_storage,
-)
-from sealag.passivity._task_multipliers import task_multipliers
-from sealag.passivity._verify import verify
+from sealag.passivity._kinds import Basis, Criterion, Place, Status
+from sealag.passivity._local import LocalLoop
+from sealag.passivity._problem import Problem
+from sealag.passivity._proofs import InstantProof, Window
+from sealag.passivity._solve import Instant, Motion, max_delay, solve
+from sealag.passivity._solvers import ClarabelCvxpy, ClarabelDirect, Solution, Solver
+from sealag.passivity._stated import Evidence
+from sealag.passivity._statement import Answer, Assumption, Critical, Question, Rest, Worst
+from sealag.passivity._verify import read_certificate, verify
+from sealag.passivity._windows import Windows
 
 __all__ = [
+    "Answer",
     "Assumption",
     "Basis",
+    "Bound",
     "Certificate",
     "Check",
     "ClarabelCvxpy",
     "ClarabelDirect",
-    "ClosedForm",
-    "CommonBound",
     "Criterion",
     "Critical",
-    "DelayBound",
-    "DelayStorage",
-    "Factor",
+    "Evidence",
+    "Instant",
+    "InstantProof",
     "LocalLoop",
-    "MultiplierProblem",
-    "MultitaskBound",
+    "Motion",
     "Place",
-    "PolytopeBound",
-    "Proof",
+    "Problem",
+    "Question",
     "Rest",
     "Solution",
     "Solver",
     "Status",
-    "TaskMultiplier",
     "Verification",
     "Window",
+    "Windows",
     "Worst",
-    "content_digest",
-    "delay_storage",
-    "factorise",
-    "joint_multiplier",
-    "limiting_direction",
-    "link_storage",
     "max_delay",
-    "max_delay_common",
-    "max_delay_common_from_stiffness",
-    "max_delay_from_stiffness",
-    "max_delay_multitask",
-    "max_delay_polytope",
-    "max_delay_polytope_from_stiffness",
-    "motor_storage",
-    "proven_delays",
     "read_certificate",
-    "refuted_delay",
-    "task_multiplier",
-    "task_multipliers",
-    "task_storage",
+    "solve",
     "verify",
     "write_certificate",
 ]

@@ -1,7 +1,7 @@
 """Roots of ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e) on and right of the axis, in doubles.
 
-A root jω with e^{-jωd} = e^{-jψ} is an eigenvalue of A_0 + e^{-jψ} A_1: all of them, whatever the
-delay, lie on curves over one circle.
+A root jω at the delay d is an eigenvalue of A_0 + e^{-jψ} A_1 with ψ = ωd: for all delays, one
+circle of ψ has to be searched.
 """
 
 import math
@@ -13,30 +13,31 @@ from sealag.passivity._definite import EPS
 from sealag.typing import Array
 
 EARLIER = 1e-6
-"""Share of a first crossing within which another one is not told apart from it."""
+"""Relative distance below which two crossings are not distinguished. Ten times less cuts the circle
+into pieces that rounding keeps open; ten times more passes a crossing 1e-5 too late."""
 
 _TURN = 0.5
 _MOST_FREQUENCIES = 60_000
 _MOST_ENTRIES = 12_000_000
-"""Of all matrices over pieces of the circle: 4,000 pieces for 56 states, 80,000 for 12. A pair of
-roots that hardly leaves the axis takes 10,000; ten times more entries take minutes."""
+"""Of all matrices over pieces of the circle: 4,000 pieces for 56 states, 80,000 for 12. A lightly
+damped pair of roots takes 10,000; ten times more entries take minutes."""
 
 _NARROW = 1e-3 * EARLIER
 _SLOW = 1e-4
-"""Pieces of the circle are not cut below the first, relative to their phase but at most to the
-second: rounding keeps narrower ones from being excluded, and their number would double."""
+"""Narrowest piece of the circle, relative to its phase, which counts as at least the second:
+rounding keeps narrower pieces from being excluded, and each cut would double their number."""
 
 _CHUNK = 512
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DelayedLoop:
-    """A loop whose symmetries are divided out.
+    """A frozen loop without its symmetries.
 
     Attributes:
-        A_0: (n, n) what acts at once.
-        A_1: (n, n) what the delay d makes late.
-        A_e: (n, n) what the embedded delay makes late; None if nothing is.
+        A_0: (n, n) what acts without delay.
+        A_1: (n, n) what is delayed by d.
+        A_e: (n, n) what is delayed by the embedded delay; None if nothing is.
         embedded: that delay, s.
     """
 
@@ -53,7 +54,7 @@ class DelayedLoop:
 
     @property
     def sum(self) -> Array:
-        """The loop in which nothing is late, (n, n)."""
+        """The loop without delays, (n, n)."""
         whole = self.A_0 + self.A_1
         return whole if self.A_e is None else whole + self.A_e
 
@@ -93,7 +94,7 @@ def balanced(*parts: Array) -> tuple[Array, ...]:
 
 
 def earliest_crossing(A_0: Array, A_1: Array, *, limit: float) -> float:
-    """Bound from below the delays at which a root lies on the axis, up to a limit.
+    """Return a delay below which no root lies on the axis, up to a limit.
 
     The circle ψ ∈ [0, π] is cut until no eigenvalue of A_0 + e^{-jψ} A_1 in a piece can be jω with
     a delay ψ/|ω|, or (2π − ψ)/|ω| for the conjugate, below the limit. In the eigenvectors X of the
@@ -106,7 +107,7 @@ def earliest_crossing(A_0: Array, A_1: Array, *, limit: float) -> float:
         limit: s, inf for none.
 
     Returns:
-        The limit if no root is on the axis before; else the shortest delay that is in doubt.
+        The limit if no root is on the axis before; else the shortest delay that is not excluded.
     """
     A_0, A_1 = balanced(A_0, A_1)
     low, high = np.linspace(0.0, math.pi, 17)[:-1], np.linspace(0.0, math.pi, 17)[1:]
@@ -159,7 +160,7 @@ def unstable_roots(loop: DelayedLoop, delay: float, *, omega: float | None) -> i
     Args:
         loop: the loop.
         delay: d, s.
-        omega: a frequency close to which more is looked at, rad/s.
+        omega: a frequency around which the grid is finer, rad/s.
 
     Returns:
         The count; None if it could not be resolved.

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,19 @@ Reader = Callable[[Any], Array]
 
 EPS = float(np.finfo(float).eps)
 
-DOUBT = "in doubt: --exact decides"
-"""What is said of an eigenvalue that rounding may have moved over 0."""
+
+class Decision(NamedTuple):
+    """Whether a matrix is positive definite.
+
+    A doubtful one, of which rounding may have moved an eigenvalue over 0, does not hold.
+    """
+
+    holds: bool
+    doubtful: bool
+    words: str
+
+
+_NOT_POSITIVE = Decision(False, False, "an entry on the diagonal is not positive")
 
 
 def doubles(values: Any) -> Array:
@@ -81,7 +92,7 @@ def size(array: Array) -> float:
     return float(np.linalg.norm(as_doubles(array)))
 
 
-def positive_definite(matrix: Array) -> tuple[str, bool]:
+def positive_definite(matrix: Array) -> Decision:
     """Decide whether a symmetric matrix is positive definite.
 
     Doubles: eigenvalues of the matrix, scaled by powers of two to a diagonal near 1, must exceed
@@ -92,22 +103,19 @@ def positive_definite(matrix: Array) -> tuple[str, bool]:
     Args:
         matrix: (N, N) doubles or rationals; its symmetric part is meant.
 
-    Returns:
-        What was found, in words, and the answer; a doubtful case is a no.
     """
     if matrix.dtype == object:
         return _exactly(matrix)
     even = (matrix + matrix.T) / 2.0
     scale = _near_one(even)
     if scale is None:
-        return "an entry on the diagonal is not positive", False
-    lowest, room = _lowest(even * scale[:, None] * scale[None, :])
-    return _words(lowest, room), lowest > room
+        return _NOT_POSITIVE
+    return _decision(*_lowest(even * scale[:, None] * scale[None, :]))
 
 
 def positive_complement(
     diagonal: Array, loss: Array, M: Array, W: Array, *, terms: tuple[Array, Array]
-) -> tuple[str, bool]:
+) -> Decision:
     """Decide in doubles whether [[C, M], [Mᵀ, W]] is positive definite: W and C − M W⁻¹ Mᵀ are.
 
     For any X, with R = Mᵀ − W X, M W⁻¹ Mᵀ = Xᵀ Mᵀ + Rᵀ X + Rᵀ W⁻¹ R: the error of the solution X
@@ -118,22 +126,19 @@ def positive_complement(
         loss: (n, n) with C = diag(diagonal) − loss.
         M: (n, m).
         W: (m, m).
-        terms: sums of the absolute values of what was added up to loss and to M.
-
-    Returns:
-        What was found, in words, and the answer; a doubtful case is a no.
+        terms: sums of the absolute values that loss and M were added up from.
     """
     whole = np.diag(diagonal)
     outer, inner = _near_one(whole), _near_one(W)
     if outer is None or inner is None:
-        return "an entry on the diagonal is not positive", False
+        return _NOT_POSITIVE
     both = outer[:, None] * outer[None, :]
     C, C_terms = (whole - loss) * both, (whole + terms[0]) * both
     M, M_terms = (part * outer[:, None] * inner[None, :] for part in (M, terms[1]))
     W = W * inner[:, None] * inner[None, :]
     least, doubt = _lowest(W)
     if not least > doubt:
-        return f"lowest eigenvalue of W {least:.3e}, rounding {doubt:.1e}", False
+        return _decision(least, doubt, of=" of W")
     X = np.linalg.solve(W, M.T)
     R = M.T - W @ X
     R_error = M_terms.T + np.abs(W) @ np.abs(X)
@@ -143,12 +148,13 @@ def positive_complement(
     lowest, room = _lowest((C + C.T) / 2.0 - (turn + turn.T) / 2.0)
     room += unit * float(np.linalg.norm(added))
     room += float(np.linalg.norm(np.abs(R) + unit * R_error)) ** 2 / (least - doubt)
-    return _words(lowest, room), lowest > room
+    return _decision(lowest, room)
 
 
-def _words(lowest: float, room: float) -> str:
-    doubt = f", {DOUBT}" if abs(lowest) <= room else ""
-    return f"lowest eigenvalue {lowest:.3e}, rounding {room:.1e}{doubt}"
+def _decision(lowest: float, room: float, of: str = "") -> Decision:
+    doubtful = abs(lowest) <= room
+    words = f"lowest eigenvalue{of} {lowest:.3e}, rounding {room:.1e}"
+    return Decision(lowest > room, doubtful, words + ", in doubt: --exact decides" * doubtful)
 
 
 def _near_one(matrix: Array) -> Array | None:
@@ -165,7 +171,7 @@ def _lowest(matrix: Array) -> tuple[float, float]:
     return float(np.linalg.eigvalsh(matrix)[0]), room
 
 
-def _exactly(matrix: Array) -> tuple[str, bool]:
+def _exactly(matrix: Array) -> Decision:
     from flint import fmpq_mat
 
     even = (matrix + matrix.T) / 2
@@ -173,5 +179,5 @@ def _exactly(matrix: Array) -> tuple[str, bool]:
     order, _, _, minors = integers.fflu()
     for k in range(len(even)):
         if order[k, k] != 1 or not minors[k, k] > 0:
-            return f"leading minor {k + 1} is not positive", False
-    return "all leading minors positive", True
+            return Decision(False, False, f"leading minor {k + 1} is not positive")
+    return Decision(True, False, "all leading minors positive")

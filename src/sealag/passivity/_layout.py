@@ -1,22 +1,37 @@
 """The layout of a file, declared once by dataclasses: plain data from it, and it from plain data.
 
-Nothing is guessed: unknown, missing and repeated keys, other types, and numbers that are none are
-errors that name the key.
+Unknown, missing and repeated keys, other types, other sizes and numbers that are not finite are
+errors that name the key. A field's size stands in its type by name, `Annotated[Array, "n", "n"]`;
+the first field that uses a name fixes the size, and an empty name is any size. A section is a
+dataclass whose fields stand in the file beside those of the class that holds it.
 """
 
 import json
 import math
 import types
-from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import cache
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
+import numpy as np
+
 from sealag.errors import CertificateError
+from sealag.typing import Array
 
 UNBOUNDED = "unbounded"
-"""What a file says where no time is too long."""
+"""How a file writes a time that no delay reaches."""
+
+SECTION = "section"
+"""Marks a field whose own fields stand in the file beside it: `Annotated[Answer, SECTION]`."""
+
+Time = Annotated[float, UNBOUNDED]
+"""A time in s that may be inf: "unbounded" in a file, for what no delay reaches."""
+
+Vector = Annotated[Array, "n"]
+Matrix = Annotated[Array, "n", "n"]
+"""(n,) and (n, n) of a certificate with n joints."""
 
 LARGEST_BYTES = 100_000_000
 """Of a file. Ten times more would let one file take 20 GB of memory; a walk of 7,000 instants with
@@ -78,12 +93,14 @@ def plain(content: bytes) -> tuple[dict[str, Any], tuple[str, ...]]:
 
 def _whole(text: str) -> int:
     if len(text) > _LONGEST_INTEGER:
-        raise CertificateError(f"the number {text[:20]}… has {len(text)} digits; no count has")
+        raise CertificateError(
+            f"the number {text[:20]}… has {len(text)} digits, too many for a count"
+        )
     return int(text)
 
 
 def _constant(text: str) -> float:
-    raise CertificateError(f"it says {text}, which is no JSON number; a time says {UNBOUNDED!r}")
+    raise CertificateError(f"it says {text}, which is not a JSON number; a time says {UNBOUNDED!r}")
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -95,26 +112,34 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def encoded(value: Any, kind: Any) -> Any:
-    """Return plain data for a value of a declared type.
+def encoded(value: Any) -> dict[str, Any]:
+    """Return the plain data of a dataclass.
 
     Args:
-        value: the value.
-        kind: its type: a dataclass, a list, a mapping, an enumeration, a number or text.
+        value: the value; its fields are dataclasses, arrays, lists, mappings, enumerations, numbers
+            or text.
     """
-    if is_dataclass(kind):
-        hints = _hints(kind)
-        return {name: encoded(getattr(value, name), hints[name]) for name in hints}
+    data = {}
+    for name, kind in _hints(type(value)).items():
+        entry = _encoded(getattr(value, name), kind)
+        data |= entry if _is_section(kind) else {name: entry}
+    return data
+
+
+def _encoded(value: Any, kind: Any) -> Any:
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (types.UnionType, Union):
-        return None if value is None else encoded(value, _one_of(inner))
-    if origin in (list, tuple):
-        return [encoded(entry, inner[0]) for entry in value]
+        return None if value is None else _encoded(value, _one_of(inner))
+    if origin is Annotated:
+        time = kind == Time and value == math.inf
+        return UNBOUNDED if time else _encoded(value, inner[0])
+    if origin is np.ndarray:
+        return value.tolist() if value.size else []
+    if origin is tuple:
+        return [_encoded(entry, inner[0]) for entry in value]
     if origin is Mapping:
-        return {key: encoded(entry, inner[1]) for key, entry in value.items()}
-    if origin is Annotated and value == math.inf:
-        return UNBOUNDED
-    return value
+        return {key: _encoded(entry, inner[1]) for key, entry in value.items()}
+    return encoded(value) if is_dataclass(kind) else value
 
 
 def decoded(data: Any, kind: type[T]) -> T:
@@ -127,41 +152,85 @@ def decoded(data: Any, kind: type[T]) -> T:
     Raises:
         CertificateError: data does not fit the type; the message names the key.
     """
-    return _read(data, kind, "")
+    return _Reader(sizes={}).object(data, kind, "")
 
 
-def _read(data: Any, kind: Any, at: str) -> Any:
-    origin, inner = get_origin(kind), get_args(kind)
-    if origin in (types.UnionType, Union):
-        return None if data is None else _read(data, _one_of(inner), at)
-    if is_dataclass(kind):
-        return _object(data, kind, at)
-    if origin in (list, tuple):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Reader:
+    """Reads plain data by declared types; sizes that a name has had so far."""
+
+    sizes: dict[str, int]
+
+    def read(self, data: Any, kind: Any, at: str) -> Any:
+        origin, inner = get_origin(kind), get_args(kind)
+        if origin in (types.UnionType, Union):
+            return None if data is None else self.read(data, _one_of(inner), at)
+        if kind == Time:
+            return math.inf if data == UNBOUNDED else _number(data, at, f"or {UNBOUNDED!r}")
+        if origin is Annotated:
+            return self.sized(data, inner[0], inner[1:], at)
+        if is_dataclass(kind):
+            return self.object(data, kind, at)
+        if origin is tuple:
+            entries = _typed(data, list | tuple, at, "a list")
+            return tuple(
+                self.read(entry, inner[0], f"{at}[{k}]") for k, entry in enumerate(entries)
+            )
+        if origin is Mapping:
+            pairs = _typed(data, dict, at, "an object").items()
+            return {
+                _text(key, f"a name in {at}"): self.read(entry, inner[1], f"{at}.{key}")
+                for key, entry in pairs
+            }
+        return _SCALARS.get(kind, lambda data, at: _word(data, kind, at))(data, at)
+
+    def object(self, data: Any, kind: Any, at: str) -> Any:
+        found, known = _typed(data, dict, at, "an object"), list(_keys(kind))
+        place = f"`{at}`" if at else "the file"
+        if missing := [name for name in known if name not in found]:
+            raise CertificateError(f"{place} lacks the key `{missing[0]}`")
+        if unknown := [name for name in found if name not in known]:
+            raise CertificateError(f"{place} has the unknown key {str(unknown[0])[:80]!r}")
+        return self.filled(found, kind, f"{at}." if at else "")
+
+    def filled(self, data: dict[str, Any], kind: Any, lead: str) -> Any:
+        values = {}
+        for name, hint in _hints(kind).items():
+            if _is_section(hint):
+                values[name] = self.filled(data, get_args(hint)[0], lead)
+            else:
+                values[name] = self.read(data[name], hint, lead + name)
+        return kind(**values)
+
+    def sized(self, data: Any, kind: Any, names: tuple[str, ...], at: str) -> Any:
+        if get_origin(kind) is np.ndarray:
+            return self.array(data, names, at)
+        found = self.read(data, kind, at)
+        self.check(found if kind is int else len(found), names[0], at)
+        return found
+
+    def array(self, data: Any, names: tuple[str, ...], at: str) -> Array:
+        """An array of doubles; an empty list has no entries along its free axis."""
+        free = tuple(name or f"axis {axis} of {at}" for axis, name in enumerate(names))
+        if data == [] and "" in names:
+            shape = [0 if not name else self.sizes.get(name, 0) for name in names]
+            return np.zeros(shape)
+        return np.array(self.rows(data, free, at), dtype=float)
+
+    def rows(self, data: Any, names: tuple[str, ...], at: str) -> list[Any]:
         entries = _typed(data, list | tuple, at, "a list")
-        if inner[0] is float and all(type(e) is float and math.isfinite(e) for e in entries):
-            return origin(entries)
-        found = (_read(entry, inner[0], f"{at}[{k}]") for k, entry in enumerate(entries))
-        return origin(found)
-    if origin is Mapping:
-        pairs = _typed(data, dict, at, "an object").items()
-        return {
-            _text(key, f"a name in {at}"): _read(entry, inner[1], f"{at}.{key}")
-            for key, entry in pairs
-        }
-    if origin is Annotated:
-        return math.inf if data == UNBOUNDED else _number(data, at, f"or {UNBOUNDED!r}")
-    return _SCALARS.get(kind, lambda data, at: _word(data, kind, at))(data, at)
+        self.check(len(entries), names[0], at)
+        if len(names) > 1:
+            return [self.rows(entry, names[1:], f"{at}[{k}]") for k, entry in enumerate(entries)]
+        if all(type(entry) is float and math.isfinite(entry) for entry in entries):
+            return list(entries)
+        return [_number(entry, f"{at}[{k}]") for k, entry in enumerate(entries)]
 
-
-def _object(data: Any, kind: Any, at: str) -> Any:
-    found, hints = _typed(data, dict, at, "an object"), _hints(kind)
-    known, place = hints.keys(), f"`{at}`" if at else "the file"
-    if missing := [name for name in known if name not in found]:
-        raise CertificateError(f"{place} lacks the key `{missing[0]}`")
-    if unknown := [name for name in found if name not in known]:
-        raise CertificateError(f"{place} has the key {str(unknown[0])[:80]!r}, which is unknown")
-    lead = f"{at}." if at else ""
-    return kind(**{name: _read(found[name], hints[name], lead + name) for name in known})
+    def check(self, length: int, name: str, at: str) -> None:
+        """Fix the size that a name stands for, or refuse another one."""
+        wanted = int(name) if name.isdigit() else self.sizes.setdefault(name, length)
+        if length != wanted:
+            raise CertificateError(f"`{at}` has {length} entries where {wanted} are needed")
 
 
 def _typed(data: Any, kind: Any, at: str, words: str) -> Any:
@@ -222,6 +291,19 @@ _SCALARS: dict[Any, Callable[[Any, str], Any]] = {
 def _hints(kind: Any) -> dict[str, Any]:
     hints = get_type_hints(kind, include_extras=True)
     return {entry.name: hints[entry.name] for entry in fields(kind)}
+
+
+def _keys(kind: Any) -> Iterator[str]:
+    """Keys of a file that a dataclass stands for."""
+    for name, hint in _hints(kind).items():
+        if _is_section(hint):
+            yield from _keys(get_args(hint)[0])
+        else:
+            yield name
+
+
+def _is_section(kind: Any) -> bool:
+    return get_origin(kind) is Annotated and get_args(kind)[1] == SECTION
 
 
 def _one_of(choices: tuple[Any, ...]) -> Any:

@@ -1,113 +1,93 @@
-"""Multipliers that prove a delay: the maximal solution of Y + d² F Y⁻¹ Fᵀ = 2D."""
+"""A multiplier W of one instant for a delay below the supremum, without a solver where that goes.
 
-from dataclasses import dataclass
+One level: W⁻¹ = J* Y⁻¹ J*ᵀ + εI from a multiplier Y in joint coordinates, with ε as large as the
+room that Y leaves. It exists for any m, n and rank of J*: where J* loses rank, W grows as d nears
+the supremum, which is then not attained. Several levels: the damping is divided among them,
+D_θ = Σ D_i, so that (29) holds for level i with D_i; the sum of these is (31).
+"""
 
 import numpy as np
 
 from sealag.errors import InputError, SolverError
-from sealag.passivity._problem import MultiplierProblem, factorise, proven_delays
-from sealag.passivity._scaling import inverse_root, scaled_task
-from sealag.typing import Array, ArrayLike
-from sealag.whole_body import StiffnessForm
+from sealag.passivity._measure import factorise, proven_delays
+from sealag.passivity._problem import Problem
+from sealag.passivity._radius import bracket
+from sealag.passivity._solvers import Solver
+from sealag.typing import Array
+
+_LEAST = 1e-9
+"""Share of the damping that even a level without stiffness gets. Ten times more costs delay that
+the bounds claim; ten times less leaves its multiplier to rounding."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TaskMultiplier:
-    """A multiplier of Theorem 1 in task coordinates, checked.
-
-    Attributes:
-        delay: d that it proves, s.
-        W: (m, m) symmetric positive definite, W = d Q.
-        Q: (m, m) the multiplier of (29) and of the storage function V_4.
-    """
-
-    delay: float
-    W: Array
-    Q: Array
-
-
-def joint_multiplier(F: ArrayLike, D_theta: ArrayLike, delay: float) -> Array:
-    """Compute Y ≻ 0 with [[2D − Y, dF], [dFᵀ, Y]] ⪰ 0 for a delay below the supremum.
-
-    Where D = I, every Y lies between the maximal solution of Y + d² F Y⁻¹ Fᵀ = 2I and 2I less the
-    maximal solution of V + d² Fᵀ V⁻¹ F = 2I; their mean leaves room for rounding. Both come from
-    cyclic reduction (Meini, Math. Comp. 2002), which converges quadratically, and exist if and
-    only if d ≤ 1 / w(D^-½ F D^-½). For J* = I the multiplier of (29) is Q = Y / d.
+def multiplier_for(problem: Problem, delay: float, *, solver: Solver) -> Array:
+    """Compute W ≻ 0, (m, m), with which (29) or (31) holds at a delay below the bound.
 
     Args:
-        F: (n, n) delayed stiffness, Nm/rad.
-        D_theta: (n,) or (n, n) motor damping, Nms/rad.
-        delay: d, s; below the supremum.
-
-    Returns:
-        (n, n) symmetric Y, checked to satisfy the inequality with room for rounding.
+        problem: one instant.
+        delay: d, s.
+        solver: where multipliers of several levels come from that have no closed form.
 
     Raises:
-        SolverError: the delay is not below the supremum, or too close to it.
+        InputError: the delay is not a positive finite time.
+        SolverError: the delay is not below the supremum, or too close to it, or the solver found
+            nothing that proves it.
     """
-    stiffness = np.asarray(F, dtype=float)
-    root, _ = inverse_root(D_theta, len(stiffness))
-    A = delay * (root @ stiffness @ root.T)
-    identity = np.eye(len(A))
-    middle = _middle(A)
-    problem = MultiplierProblem(J=identity[None], M=A[None], blocks=(len(A),))
-    if proven_delays(problem, factorise(problem, middle))[0] < 1.0:
-        raise SolverError(f"No multiplier proves the delay {delay:.6g} s: it is at the supremum.")
-    back = np.linalg.inv(root)
-    scaled = back @ middle @ back.T
-    return (scaled + scaled.T) / 2.0
-
-
-def task_multiplier(
-    J_star: ArrayLike,
-    Lambda: ArrayLike,
-    K_x: ArrayLike,
-    D_theta: ArrayLike,
-    *,
-    delay: float,
-    form: StiffnessForm | str = StiffnessForm.SYMMETRIC,
-) -> TaskMultiplier:
-    """Compute W = dQ ≻ 0 with which (29) holds, at one instant, for a delay below the supremum.
-
-    W⁻¹ = J* Y⁻¹ J*ᵀ + εI from the multiplier Y in joint coordinates, ε as large as the room that Y
-    leaves. It exists for any m, n and rank of J*: where J* loses rank, W grows as d nears the
-    supremum, which is then not attained.
-
-    Args:
-        J_star: (m, n) contact-consistent Jacobian J*.
-        Lambda: (m, m) task inertia.
-        K_x: (m,) or (m, m) task gains.
-        D_theta: (n,) or (n, n) motor damping, Nms/rad.
-        delay: d, s; below the supremum.
-        form: symmetric, published or force stiffness.
-
-    Returns:
-        The multiplier, checked to satisfy the inequality with room for rounding.
-
-    Raises:
-        InputError: an array is unusable, or a batch.
-        SolverError: the delay is not below the supremum, or too close to it.
-    """
-    task = scaled_task(J_star, Lambda, K_x, D_theta, form=form)
-    if task.J.ndim != 2 or task.M.ndim != 2:
-        raise InputError("A task multiplier belongs to one instant; loop over a batch.")
     if not (np.isfinite(delay) and delay > 0.0):
         raise InputError(f"delay is {delay:g} s; a positive finite time is needed.")
-    W = closed_form_multiplier(task.J, task.M, delay)
-    problem = MultiplierProblem(J=task.J[None], M=task.M[None], blocks=(len(task.J),))
-    if proven_delays(problem, factorise(problem, W))[0] < delay or W is None:
-        raise SolverError(f"No multiplier proves the delay {delay:.6g} s: it is at the supremum.")
-    return TaskMultiplier(delay=delay, W=W, Q=W / delay)
+    one, status = problem.motion(), "it is at the supremum"
+    parts = _damping_parts(problem, delay)
+    if parts is not None:
+        W = _divided(problem, parts, delay)
+    else:
+        found = solver.solve(one)
+        W, status = _eased(one, found.W, delay), f"{solver.name} says {found.status}"
+    if W is None or proven_delays(one, factorise(one, W))[0] < delay:
+        raise SolverError(f"No multiplier proves the delay {delay:.6g} s: {status}.")
+    return W
 
 
-def closed_form_multiplier(J: Array, M: Array, delay: float) -> Array | None:
-    """W for one instant in coordinates scaled by D_θ^-½; None where no room is left.
+def _damping_parts(problem: Problem, delay: float) -> list[Array] | None:
+    """The damping of each level, D^-½ D_i D^-½ (n, n); None where only a solver finds it.
 
-    Args:
-        J: (m, n) scaled Jacobian.
-        M: (n, m) scaled Jᵀ S.
-        delay: d, s.
+    One level has all. Symmetric levels need d A_i, for delays up to 1/w(Σ A_i); others at most
+    d w(A_i) I, for delays up to 1/Σ w(A_i). What is left is shared equally.
     """
+    n, count = problem.J.shape[-1], len(problem.blocks)
+    if count == 1:
+        return [np.eye(n)]
+    A = [problem.scaled_stiffness(rows) for rows in problem.rows]
+    if problem.semidefinite:
+        needs = [delay * one for one in A]
+    else:
+        radii = [1.0 / float(bracket(one, np.zeros(()), tolerance=1e-9).delay) for one in A]
+        needs = [delay * radius * np.eye(n) for radius in radii]
+    rest = (np.eye(n) - sum(needs)) / count
+    if not np.linalg.eigvalsh(rest)[0] > _LEAST:
+        return None
+    return [need + rest for need in needs]
+
+
+def _divided(problem: Problem, parts: list[Array], delay: float) -> Array | None:
+    """Each level's closed form with its part of the damping."""
+    whole = np.zeros((len(problem.J), len(problem.J)))
+    for rows, part in zip(problem.rows, parts, strict=True):
+        root = np.linalg.inv(np.linalg.cholesky(part))
+        W = _closed_form(problem.J[rows] @ root.T, root @ problem.M[:, rows], delay)
+        if W is None:
+            return None
+        whole[rows, rows] = W
+    return whole
+
+
+def _eased(problem: Problem, W: Array | None, delay: float) -> Array | None:
+    """A solver's multiplier of its own longest delay, for a shorter one with room for rounding."""
+    longest = float(proven_delays(problem, factorise(problem, W))[0])
+    return None if W is None or longest < delay else np.sqrt(delay / longest) * W
+
+
+def _closed_form(J: Array, M: Array, delay: float) -> Array | None:
+    """W of one level, (m, m), from J (m, n) and M (n, m); None where no room is left."""
     A = delay * (M @ J)
     Y = _middle(A)
     if not np.isfinite(Y).all():
@@ -122,20 +102,24 @@ def closed_form_multiplier(J: Array, M: Array, delay: float) -> Array | None:
         return None
     load = float(np.linalg.norm(delay * M)) ** 2
     epsilon = 0.25 * lowest / load if load > 0.0 else 1.0
-    wide = J @ half.T
-    sides, sizes, _ = np.linalg.svd(wide, full_matrices=True)
+    sides, sizes, _ = np.linalg.svd(J @ half.T, full_matrices=True)
     squares = np.zeros(len(J))
     squares[: len(sizes)] = sizes**2
     return (sides / (squares + epsilon)) @ sides.T
 
 
 def _middle(A: Array) -> Array:
-    """Mean of the largest and the smallest Y with [[2I − Y, A], [Aᵀ, Y]] ⪰ 0."""
+    """Y with [[2I − Y, A], [Aᵀ, Y]] ⪰ 0 and room for rounding, (n, n).
+
+    Every Y lies between the maximal solution of Y + A Y⁻¹ Aᵀ = 2I and 2I less the maximal solution
+    of V + Aᵀ V⁻¹ A = 2I, which exist if and only if w(A) ≤ 1; the mean is returned.
+    """
     return (_maximal(A.T) + 2.0 * np.eye(len(A)) - _maximal(A)) / 2.0
 
 
 def _maximal(A: Array) -> Array:
-    """Maximal solution X of X + Aᵀ X⁻¹ A = 2I; not finite or no solution where there is none."""
+    """Maximal solution X of X + Aᵀ X⁻¹ A = 2I by cyclic reduction (Meini, Math. Comp. 2002), which
+    converges quadratically; not finite or no solution where there is none."""
     X = rest = 2.0 * np.eye(len(A))
     for _ in range(60):
         try:

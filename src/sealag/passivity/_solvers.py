@@ -1,7 +1,7 @@
-"""Solvers behind one interface: closed form, Clarabel directly, Clarabel through CVXPY.
+"""Solvers behind one interface: Clarabel directly, and Clarabel through CVXPY.
 
-A solver turns a `MultiplierProblem` into a `Solution`, a mere candidate: `proven_delays` and
-`refuted_delay` measure what it shows. One that stops early or lies costs tightness, never truth.
+A solver turns a `Problem` into a `Solution`, a mere candidate, which `solve` measures. One that
+stops early or lies costs tightness, never truth.
 """
 
 from dataclasses import dataclass
@@ -9,12 +9,30 @@ from typing import Protocol
 
 import numpy as np
 
-from sealag.passivity._multipliers import closed_form_multiplier
-from sealag.passivity._problem import MultiplierProblem, Solution
+from sealag.passivity._problem import Problem, transposed
 from sealag.typing import Array
 
 _RANK = 1e-10
+"""Relative size of a direction of J from which W acts on it. Ten times less leaves the SDP to
+rounding; ten times more gives up delay where a Jacobian is nearly singular."""
+
 _FREE = 1e-10
+"""Share of the delay that a finite W costs on directions that no J reaches."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solution:
+    """What a solver says; nothing in it is believed before it is measured.
+
+    Attributes:
+        W: (m, m) multiplier, or None.
+        P: (N, n, n) dual multipliers, or None.
+        status: the solver's own words.
+    """
+
+    W: Array | None
+    P: Array | None
+    status: str
 
 
 class Solver(Protocol):
@@ -25,51 +43,13 @@ class Solver(Protocol):
         """What the solver is called in results."""
         ...
 
-    def solve(self, problem: MultiplierProblem) -> Solution:
+    def solve(self, problem: Problem) -> Solution:
         """Propose multipliers.
 
         Args:
             problem: what they are wanted for.
         """
         ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClosedForm:
-    """Theorem 1 at one instant by numerical radius and cyclic reduction.
-
-    Attributes:
-        share: share of the supremum that the multiplier is made for.
-    """
-
-    share: float = 1.0 - 1e-9
-
-    @property
-    def name(self) -> str:
-        """What the solver is called in results."""
-        return "closed form"
-
-    def solve(self, problem: MultiplierProblem) -> Solution:
-        """Propose multipliers for one instant and one block; none for anything else.
-
-        Args:
-            problem: what they are wanted for.
-        """
-        from sealag.kernels.numerical_radius import numerical_radii
-
-        if len(problem.J) != 1 or len(problem.blocks) != 1:
-            return Solution(W=None, P=None, status="one instant and one task have a closed form")
-        A = problem.M @ problem.J
-        lower, upper, angle = (np.zeros(1) for _ in range(3))
-        numerical_radii(np.ascontiguousarray(A), np.zeros(1), 1e-12, lower, upper, angle)
-        if not upper[0] > 0.0:
-            return Solution(W=np.eye(A.shape[1]), P=None, status="zero stiffness")
-        phi, A_t = angle[0], A[0].T
-        H = np.cos(phi) * (A[0] + A_t) / 2.0 + 0.5j * np.sin(phi) * (A[0] - A_t)
-        x = np.linalg.eigh(H)[1][:, -1]
-        P = np.outer(x, x.conj()).real[None]
-        W = closed_form_multiplier(problem.J[0], problem.M[0], self.share / upper[0])
-        return Solution(W=W, P=P, status="solved" if W is not None else "no room for rounding")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +69,7 @@ class ClarabelDirect:
         """What the solver is called in results."""
         return "Clarabel"
 
-    def solve(self, problem: MultiplierProblem) -> Solution:
+    def solve(self, problem: Problem) -> Solution:
         """Propose multipliers.
 
         Args:
@@ -141,7 +121,7 @@ class ClarabelCvxpy:
         """What the solver is called in results."""
         return "CVXPY + Clarabel"
 
-    def solve(self, problem: MultiplierProblem) -> Solution:
+    def solve(self, problem: Problem) -> Solution:
         """Propose multipliers.
 
         Args:
@@ -154,7 +134,7 @@ class ClarabelCvxpy:
         m = sum(inner.blocks)
         d, W = cp.Variable(), cp.Variable((m, m), symmetric=True)
         inside = np.zeros((m, m), dtype=bool)
-        for rows in inner.slices():
+        for rows in inner.rows:
             inside[rows, rows] = True
         matrices = []
         for J, M in zip(inner.J, inner.M):
@@ -177,7 +157,7 @@ class ClarabelCvxpy:
 class _Balance:
     """A problem whose numbers are near 1, and the way back for its multiplier."""
 
-    problem: MultiplierProblem
+    problem: Problem
     reach: Array
     rest: Array
 
@@ -186,7 +166,7 @@ class _Balance:
         return self.reach @ W @ self.reach.T + self.rest
 
 
-def _balanced(problem: MultiplierProblem) -> _Balance:
+def _balanced(problem: Problem) -> _Balance:
     """Scale rows of J against columns of M, and take out task directions that no J reaches.
 
     There W should be infinite; a finite weight that costs 1e-10 of the delay takes its place.
@@ -201,7 +181,7 @@ def _balanced(problem: MultiplierProblem) -> _Balance:
     scale = np.where(both, np.sqrt(np.where(both, size_J, 1.0) / np.where(both, size_M, 1.0)), 1.0)
     J, M = problem.J / scale[:, None], guess * problem.M * scale
     reach, blocks, rest = [], [], np.zeros((m, m))
-    for rows in problem.slices():
+    for rows in problem.rows:
         stacked = np.moveaxis(J[:, rows], 1, 0).reshape(rows.stop - rows.start, -1)
         U, values, _ = np.linalg.svd(stacked, full_matrices=True)
         rank = max(int((values > _RANK * values[0]).sum()), 1)
@@ -212,25 +192,25 @@ def _balanced(problem: MultiplierProblem) -> _Balance:
         load = float(np.linalg.norm(M @ lost, axis=(1, 2)).max())
         rest += lost @ lost.T * max(load**2 / _FREE, 1.0)
     basis = np.hstack(reach)
-    inner = MultiplierProblem(J=np.swapaxes(basis, 0, 1) @ J, M=M @ basis, blocks=tuple(blocks))
+    inner = Problem(J=basis.T @ J, M=M @ basis, blocks=tuple(blocks))
     back = 1.0 / scale[:, None]
     return _Balance(problem=inner, reach=back * basis, rest=back * rest * back.T)
 
 
-def _affine(problem: MultiplierProblem) -> tuple[Array, Array]:
+def _affine(problem: Problem) -> tuple[Array, Array]:
     """The block matrix as constant + Σ x_k parts[k], x = (d, entries of W); parts (K, N, s, s)."""
     count, m, n = problem.J.shape
     constant = np.zeros((n + m, n + m))
     constant[:n, :n] = 2.0 * np.eye(n)
     first = np.zeros((count, n + m, n + m))
     first[:, :n, n:] = problem.M
-    first[:, n:, :n] = np.swapaxes(problem.M, 1, 2)
+    first[:, n:, :n] = transposed(problem.M)
     parts = [first]
     for i, j in _entries(problem.blocks):
         part = np.zeros((count, n + m, n + m))
         corner = problem.J[:, i, :, None] * problem.J[:, j, None, :]
         if i != j:
-            corner = corner + np.swapaxes(corner, 1, 2)
+            corner = corner + transposed(corner)
         part[:, :n, :n] = -corner
         part[:, n + i, n + j] = part[:, n + j, n + i] = 1.0
         parts.append(part)

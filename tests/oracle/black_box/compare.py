@@ -49,7 +49,7 @@ def ask_sealag(system: Any) -> Theirs:
     Args:
         system: the design.
     """
-    found: Any = sealag.certify(system, proofs=1)
+    found = sealag.certify(system, proofs=1).answer
     return Theirs(
         status=str(found.status),
         stable=found.stable,

@@ -75,7 +75,8 @@ def compare_motion(path: Path, csv: Path) -> Verdict:
     if any(not one.decided for both in ours for one in both.answers):
         return verdict("undecided", "a root is next to the axis")
     wrong = judge_motion(ours, found)
-    said = f"bases {[str(b) for b in found.instant_basis]}, margin {found.local_margin_s}"
+    bases = [str(basis) for basis in found.evidence.instant_basis]
+    said = f"bases {bases}, margin {found.answer.local_margin_s}"
     return verdict("disagree" if wrong else "agree", "; ".join(wrong) or said)
 
 
@@ -87,9 +88,10 @@ def judge_motion(ours: list[Both], found) -> list[str]:
         found: sealag's certificate.
     """
     wrong, margins = [], [_true_margin(both) for both in ours]
-    exact, bound = [], number(found.max_delay_s) or 0.0
+    answer, evidence = found.answer, found.evidence
+    exact, bound = [], number(answer.max_delay_s) or 0.0
     for k, true in enumerate(margins):
-        basis, said = str(found.instant_basis[k]), number(found.instant_margins_s[k])
+        basis, said = str(evidence.instant_basis[k]), number(evidence.instant_margins_s[k])
         if basis == "open":
             continue
         assert said is not None
@@ -99,15 +101,15 @@ def judge_motion(ours: list[Both], found) -> list[str]:
                 wrong.append(f"instant {k} exactly {said:.9g} s, true {true:.9g} s")
         elif said > true * (1 + AGREEMENT):
             wrong.append(f"instant {k} at least {said:.9g} s ({basis}), true {true:.9g} s")
-        if found.status == "certified" and true > 0.0 and bound > true * (1 + AGREEMENT):
+        if answer.status == "certified" and true > 0.0 and bound > true * (1 + AGREEMENT):
             wrong.append(f"certified to {bound:.9g} s, instant {k} loses it at {true:.9g} s")
-    if exact and not same(number(found.local_margin_s) or 0.0, min(exact)):
-        wrong.append(f"margin {found.local_margin_s}, smallest exact {min(exact):.9g} s")
+    if exact and not same(number(answer.local_margin_s) or 0.0, min(exact)):
+        wrong.append(f"margin {answer.local_margin_s}, smallest exact {min(exact):.9g} s")
     if exact and len(exact) == len(margins) and not same(min(exact), min(margins)):
         wrong.append(f"smallest {min(exact):.9g} s, true {min(margins):.9g} s")
-    if found.stable and min(margins) == 0.0:
+    if answer.stable and min(margins) == 0.0:
         wrong.append("stable, and an instant is not")
-    if found.stable is False and min(margins) > 0.0:
+    if answer.stable is False and min(margins) > 0.0:
         wrong.append("not stable, and every instant is")
     return wrong
 
