@@ -7,7 +7,7 @@ import pytest
 
 from helpers.source import ROOT
 from sealag.cli import main
-from sealag.design import load, motion_table, save_motion
+from sealag.design import load, save_motion
 from sealag.robot import resolve_urdf
 
 GOOD = resolve_urdf("bundled:hume.urdf").with_suffix(".toml").read_text()
@@ -257,8 +257,10 @@ def test_motion_problem_is_named(name, walk, tmp_path, capsys):
     system, motion = walk
     spoil, word = MOTIONS[name]
     path = tmp_path / "m.npz"
-    table = {key: value.copy() for key, value in motion_table(motion, system.robot).items()}
-    np.savez(path, **spoil(table))
+    save_motion(motion, system.robot, path)
+    with np.load(path) as table:
+        spoiled = spoil(dict(table))
+    np.savez(path, **spoiled)
     err = fails(capsys, "certify", "bundled:hume", "--motion", path, "--out", tmp_path / "c.json")
     assert "m.npz" in err
     assert word in err

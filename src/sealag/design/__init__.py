@@ -4,7 +4,7 @@ from sealag.design._certify import certify, check_question
 from sealag.design._criteria import certified_bounds
 from sealag.design._local import local_of, margin_of
 from sealag.design._margins import local_margins
-from sealag.design._motion_file import load_motion, motion_table, save_motion
+from sealag.design._motion_file import load_motion, save_motion
 from sealag.design._project import load, parse_project, resolve_project
 from sealag.design._recheck import verify_design
 from sealag.design._simulate import scenario_duration, simulate
@@ -21,7 +21,6 @@ __all__ = [
     "local_margins",
     "local_of",
     "margin_of",
-    "motion_table",
     "parse_project",
     "resolve_project",
     "save_motion",
