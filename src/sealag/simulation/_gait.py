@@ -12,11 +12,11 @@ from sealag.typing import Array, IntArray
 from sealag.walking import Side, Walking
 
 SPEED_TOLERANCE = 0.20
-"""Relative. Pushes and noise of a steady gait move its apex speeds by 10 to 15 %; at 2 % hardly any
-walk under delay is a gait, at 200 % a robot that stumbles forward is one."""
+"""Relative. Ten times less calls every answer to a push a failed gait; ten times more calls a robot
+that stumbles forward or stands still one."""
 WIDTH_TOLERANCE = 0.25
-"""Relative. Step widths of a steady gait stay within 20 %; at 2.5 % hardly any walk over rough
-ground is a gait, at 250 % one with crossed legs is."""
+"""Relative. Ten times less forbids the steps aside that placement takes for balance; ten times more
+allows crossed legs."""
 SETTLING = 2
 """Steps before the gait counts. Without them the start counts; 20 are longer than most walks."""
 GRAZE = 0.3
