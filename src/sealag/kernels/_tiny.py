@@ -184,6 +184,11 @@ def _glide(raw: Any, raw_terms: Any, instants: Any, books: Any) -> None:
     run.glide(raw, raw_terms, instants, books, whole, tuple(log), (0.0, 0, 0, run.WATCH), 1.0)
 
 
+def _different(kind: Any) -> tuple[float, ...]:
+    """Numbers of which no two are equal, so that no difference is 0."""
+    return tuple(1.0 + 0.1 * k for k in range(len(kind._fields)))
+
+
 def _walk() -> None:
     tree, mounts, six, three = _tree(6), _mounts(2, 12), np.zeros(6), np.zeros(3)
     terms, q, v = tuple(dynamics.allocate(tree)), _upright(6), np.zeros(12)
@@ -191,9 +196,9 @@ def _walk() -> None:
     walking.quintic_at(six, 0.5, three.copy())
     two, table, body = np.zeros((2, 3)), np.zeros((6, 2, 4)), (tuple(tree), terms, tuple(mounts))
     step = walking.StepNow(old=three, new=three, height=six, offset=0.0, phase=0.1)
-    gait = tuple(1.0 for _ in walking.Gait._fields)
+    gait = _different(walking.Gait)
     walking.capture_end(three, three, six[:2], tuple(step), gait, 1.0, np.zeros((2, 2)))
-    plan = tuple(1.0 for _ in walking.SwingPlan._fields)
+    plan = _different(walking.SwingPlan)
     walking.swing(np.zeros((3, 3)), three, 0.1, 1e-3, plan, 0.0, 0.1)
     walking_state.foresee(
         body, (0, 0, two), (six, table), (0.0, 1e-3, 1, 0.0, 0.0),
@@ -203,6 +208,6 @@ def _walk() -> None:
         height=six, height_time=0.1, swing=np.zeros((3, 3)), phase=0.1, transfer_time=0.05,
         stance=0, still=False,
     )  # fmt: skip
-    gains = tuple(1.0 for _ in walking_law.Gains._fields)
+    gains = _different(walking_law.Gains)
     walking_law.law(body[1:], v, v, tuple(wish), gains, six.copy(), six.copy())
     walking_law.carry(six, six, six.copy(), six, six, six, six, gains[:4], six.copy())
