@@ -11,9 +11,15 @@ from sealag.robot import Robot
 Command = Callable[..., tuple[int, str, str]]
 
 
-def pytest_sessionstart() -> None:
-    """Leave the folder that pytest was started in before any test module is imported."""
-    os.chdir(tempfile.mkdtemp(prefix="sealag-tests-"))
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Leave the folder that pytest was started in before any test module is imported.
+
+    Workers of pytest-xdist start where their controller is and look for tests from there, so that
+    it stays.
+    """
+    workers = session.config.getoption("numprocesses", None)
+    if not workers or hasattr(session.config, "workerinput"):
+        os.chdir(tempfile.mkdtemp(prefix="sealag-tests-"))
 
 
 @pytest.fixture(autouse=True)
