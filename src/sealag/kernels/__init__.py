@@ -38,8 +38,9 @@ def _cached(name: str) -> bool:
     from numba.core.dispatcher import Dispatcher
 
     module = importlib.import_module(f"{__name__}.{name}")
-    own = [value for value in vars(module).values() if isinstance(value, Dispatcher)]
-    place = next(kernel for kernel in own if kernel.py_func.__module__ == module.__name__)
-    indices = Path(str(place.stats.cache_path)).glob(f"{name}.*.nbi")
+    kernels = [value for value in vars(module).values() if isinstance(value, Dispatcher)]
+    own = [kernel for kernel in kernels if kernel.py_func.__module__ == module.__name__]
+    place = next(path for kernel in own if (path := kernel.stats.cache_path))  # inner ones have none
+    indices = Path(str(place)).glob(f"{name}.*.nbi")
     source = Path(str(module.__file__)).stat().st_mtime
     return any(index.stat().st_mtime > source for index in indices)
