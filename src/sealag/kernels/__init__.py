@@ -40,7 +40,8 @@ def _cached(name: str) -> bool:
     module = importlib.import_module(f"{__name__}.{name}")
     kernels = [value for value in vars(module).values() if isinstance(value, Dispatcher)]
     own = [kernel for kernel in kernels if kernel.py_func.__module__ == module.__name__]
-    place = next(path for kernel in own if (path := kernel.stats.cache_path))  # inner ones have none
+    # Inner kernels are not cached and have no path.
+    place = next(path for kernel in own if (path := kernel.stats.cache_path))
     indices = Path(str(place)).glob(f"{name}.*.nbi")
     source = Path(str(module.__file__)).stat().st_mtime
     return any(index.stat().st_mtime > source for index in indices)
