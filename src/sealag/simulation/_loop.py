@@ -185,6 +185,7 @@ class _Loop:
     def _plan(self, steps: int, every: int) -> None:
         """Lay out all that happens: loads, samples, ticks and takings, and what is logged."""
         kernel, step = self._kernel, self.clock.physics
+        self._log = allocate_log(self.plant, -(-steps // every) + 1)  # too long a run ends here
         ways = Exchanges.plan(self._network, self.clock, duration=steps * step, seed=self.seed)
         self.exchanges = ways
         self._periods = kernel.Periods(
@@ -200,7 +201,6 @@ class _Loop:
             first=self.first, torque=self.plant.now.tau_sea, row=self.truth.data.size,
             work=self._given.work,
         )  # fmt: skip
-        self._log = allocate_log(self.plant, -(-steps // every) + 1)
         self._raw = tuple(map(tuple, (self._channels, self._limits, self._log)))
 
     def _fall_limits(self) -> "Limits":
