@@ -21,6 +21,11 @@ CHECKERS = (
 )  # fmt: skip
 
 
+def test_what_is_no_file_is_told_so():
+    with pytest.raises(CertificateError, match="checks itself with `checks`"):
+        verify(read_certificate(made("baxter")))
+
+
 @pytest.mark.parametrize("exact", [False, True])
 @pytest.mark.parametrize("design", ["baxter", "moving", "crawl"])
 def test_holds_as_made(design, exact):

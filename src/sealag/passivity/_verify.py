@@ -88,6 +88,11 @@ def _plain(source: Path | str | Mapping[str, Any]) -> tuple[dict[str, Any], tupl
     """The plain data, and numbers of the file whose digits are not those of their double."""
     if isinstance(source, Mapping):
         return dict(source), ()
+    if not isinstance(source, Path | str):
+        raise CertificateError(
+            f"A {type(source).__name__} is no file of a certificate: `write_certificate` writes "
+            "one; a Certificate checks itself with `checks`."
+        )
     content = read_whole(Path(source), what="The certificate", largest=LARGEST_BYTES)
     try:
         return plain(content)
