@@ -17,7 +17,8 @@ from sealag.design import load
 from sealag.walking import GroundProfile, begin_walk
 from sealag.whole_body import Controller, Measurement, Tank
 
-WARM, TICKS = 1_000, 10_000
+WARM, TICKS = 6_000, 10_000
+"""Ticks before the measured ones, in which kernels are loaded one by one, and measured ticks."""
 GAPS = 2_000
 """Blocks of each small size that are taken before the measured ticks, 68 MB in all."""
 HOUR = 3_600_000
