@@ -12,7 +12,7 @@ from pathlib import Path
 
 
 def compile_all(progress: Callable[[str], None], *, missing_only: bool = False) -> None:
-    """Compile and cache kernels: a minute or two after an installation, then never again.
+    """Compile and cache kernels: some three minutes after an installation, then never again.
 
     Args:
         progress: called with the name of each module before it is compiled.
