@@ -1,7 +1,7 @@
 """Compiled kernels: `@njit` functions over arrays, nothing else.
 
-What crosses from Python is a raw tuple of arrays, which costs a microsecond; inside the kernel a
-NamedTuple names its parts, which costs nothing. Each kernel has a slow twin in plain NumPy under
+What a kernel needs at every call is a NamedTuple that is handed over once, by `keep`: to pass a
+hundred arrays at every call costs more than a simulation step. Each kernel has a slow twin in plain NumPy under
 ``tests/reference``. Importing this package compiles nothing; ``python -m sealag.kernels`` compiles
 and caches every kernel.
 """
@@ -9,6 +9,20 @@ and caches every kernel.
 import importlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+
+def keep(parts: Any) -> Any:
+    """Return a NamedTuple of arrays, numbers and such NamedTuples as kernels take it.
+
+    Arrays stay live: what a kernel writes is seen through the NamedTuple, and the other way round.
+
+    Args:
+        parts: the NamedTuple.
+    """
+    from sealag.kernels._jit import keep as compiled
+
+    return compiled(parts)
 
 
 def compile_all(progress: Callable[[str], None], *, missing_only: bool = False) -> None:

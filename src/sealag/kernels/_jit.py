@@ -1,13 +1,101 @@
-"""How kernels are compiled."""
+"""How kernels are compiled.
+
+An `entry` is called from Python and cached with all that it calls. An `inner` kernel exists only
+inside entries: it is inlined there, and neither optimised nor translated on its own, which would
+take most of the compilation. It counts no references, for that costs more than its arithmetic. So
+it can neither allocate nor return arrays to a kernel that counts; `allocating` ones do that.
+"""
 
 from typing import Any
 
-from numba import njit
+from numba import njit, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+from numba.experimental import structref
 
-_WITHOUT: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-entry = njit(cache=True)
+class _NoEnvironments:
+    """Stands for the code generator of kernels that no Python function calls."""
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """There is no machine code that would look for it."""
+
+
+class _InlinedLibrary(JITCodeLibrary):
+    """Code that is linked into others: neither optimised nor translated on its own."""
+
+    @property
+    def codegen(self) -> Any:
+        return _NoEnvironments()
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return 0: no machine code of that name exists."""
+        self._ensure_finalized()
+        return 0
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _InlinedLowering(NativeLowering):
+    """Numba's own lowering, into an `_InlinedLibrary`."""
+
+    _name = "inlined_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        return NativeLowering.run_pass(self, state)
+
+
+class _Inlined(CompilerBase):
+    """Numba's compiler with `_InlinedLowering`."""
+
+    def define_pipelines(self) -> list[Any]:
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [
+            (_InlinedLowering if step is NativeLowering else step, why)
+            for step, why in passes.passes
+        ]
+        passes.finalize()
+        return [passes]
+
+
+_INLINED: dict[str, Any] = {
+    "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True,
+    "pipeline_class": _Inlined,
+}  # fmt: skip
+
+entry = njit(cache=True, no_cfunc_wrapper=True, _nrt=True)
 """Called from Python, and kept on disk with all that it calls."""
 
-inner = njit(**_WITHOUT)
-"""Called by kernels only: without what Python needs to call it, half of its compilation."""
+allocating = njit(_nrt=True, **_INLINED)
+"""Called by kernels only; returns arrays."""
+
+inner = njit(_nrt=False, **_INLINED)
+"""Called by kernels only; reads and writes arrays that it is given."""
+
+
+@structref.register
+class _KeptType(types.StructRef):
+    """Numba's type of `Kept`."""
+
+
+class Kept(structref.StructRefProxy):
+    """Named parts as kernels read them: handed over once, by `keep`, instead of at every call."""
+
+
+structref.define_proxy(Kept, _KeptType, ["parts"])
+
+
+@njit(cache=True)
+def keep(parts):
+    """Return a NamedTuple of arrays, numbers and such NamedTuples for kernels; arrays stay live."""
+    return Kept(parts)

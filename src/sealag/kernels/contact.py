@@ -9,7 +9,16 @@ import numpy as np
 
 from sealag.kernels import friction
 from sealag.kernels._jit import entry, inner
-from sealag.kernels.dynamics import Frames, Mounts, Terms, Tree, frame_terms, rigid_body_terms
+from sealag.kernels.dynamics import (
+    Frames,
+    Mounts,
+    Terms,
+    Tree,
+    allocate,
+    allocate_frames,
+    frame_terms,
+    rigid_body_terms,
+)
 from sealag.kernels.friction import Equations, Surfaces
 from sealag.kernels.ledger import DISTURBANCE, HOLDING, SLIDING, TORSION
 from sealag.kernels.linalg import cholesky, copy, forward_solve
@@ -80,35 +89,30 @@ class Work(NamedTuple):
     J: Array  # (T, 3, nv) Jacobians of the points
     drift: Array  # (T, 3) their accelerations at zero v̇
     equations: Equations
-
-
-@inner
-def plant_of(raw_plant):
-    """Return the named parts of raw ones."""
-    tree, mounts, motors, contacts = raw_plant
-    return Plant(Tree(*tree), Mounts(*mounts), Motors(*motors), Contacts(*contacts))
+    velocity: Array  # (nv,) scratch of an impact, or of an acceleration
+    force: Array  # (P, 3) likewise
+    yielding: Array  # (P,) likewise
 
 
 @inner
 def surfaces_of(contacts):
     """Return the friction of the contact points."""
     return Surfaces(
-        contacts.frame[: contacts.closed.size], contacts.friction, contacts.ridge,
-        contacts.torsion_damping, contacts.torsion_radius,
+        contacts.frame, contacts.friction, contacts.ridge, contacts.torsion_damping,
+        contacts.torsion_radius,
     )  # fmt: skip
 
 
-@inner
-def allocate_work(plant, terms):
+def allocate_work(plant: Plant) -> Work:
     """Return memory for evaluations of a plant."""
-    nv, contacts = terms.nle.size, plant.contacts
-    total, count = contacts.frame.size, plant.mounts.joint.size
-    frames = Frames(
-        np.zeros((count, 6, nv)), np.zeros((count, 3, 3)), np.zeros((count, 3)),
-        np.zeros((count, 6)),
+    terms, contacts = allocate(plant.tree), plant.contacts
+    nv, total, points = len(terms.nle), len(contacts.frame), len(contacts.closed)
+    return Work(
+        terms=terms, frames=allocate_frames(len(plant.mounts.joint), nv),
+        J=np.zeros((total, 3, nv)), drift=np.zeros((total, 3)),
+        equations=friction.allocate_equations(nv, points, len(contacts.torsion_radius)),
+        velocity=np.zeros(nv), force=np.zeros((points, 3)), yielding=np.zeros(points),
     )  # fmt: skip
-    equations = friction.allocate_equations(nv, contacts.closed.size, contacts.torsion_radius.size)
-    return Work(terms, frames, np.zeros((total, 3, nv)), np.zeros((total, 3)), equations)
 
 
 @inner
@@ -280,10 +284,12 @@ def resolve(plant, now, work, touching, impact, impulse):
     if not _prepare(plant, now, work):
         return friction.UNSOLVABLE, 0.0
     project(eq.L, work.J, contacts.C, touching, eq.rows)
-    x, yielding, force = np.zeros(now.v.size), contacts.yielding, now.force.copy()
+    x, yielding, force = work.velocity, contacts.yielding, work.force
+    copy(now.force, force)
     if impact:
         eq.target[:], eq.spin[:], force[:] = 0.0, 0.0, 0.0
-        yielding = np.zeros(touching.size)
+        yielding = work.yielding
+        yielding[:] = 0.0
         for c in range(now.v.size):
             eq.free[c] = 0.0
             for k in range(c, now.v.size):
@@ -357,28 +363,22 @@ def smallest_margin(C, closed, weight, force, gap, velocity):
 
 
 @inner
-def write_measurement(at, closed, foot, t, row):
+def write_measurement(at, contacts, t, row):
     """Write what the sensors measure at an instant.
 
     Args:
         at: the instant, evaluated.
-        closed: (P,) whether each point is closed.
-        foot: (≥ P,) number of its foot.
+        contacts: which points are closed, and their feet.
         t: the time that the measurement says, s.
         row: of a `sealag.whole_body.Measurement`: time, q, v, theta, theta_dot, tau_sea and one
             flag for each foot; written.
     """
     row[0], place = t, 1
     for part in (at.q, at.v, at.theta, at.theta_dot, at.tau_sea):
-        copy(part, row[place : place + part.size])
+        for i in range(part.size):
+            row[place + i] = part[i]
         place += part.size
     row[place:] = 0.0
-    for i in range(closed.size):
-        if closed[i]:
-            row[place + foot[i]] = 1.0
-
-
-@entry
-def sense(raw_now, closed, foot, t, row):
-    """Write what the sensors measure at an instant, see `write_measurement`."""
-    write_measurement(Instant(*raw_now), closed, foot, t, row)
+    for i in range(contacts.closed.size):
+        if contacts.closed[i]:
+            row[place + contacts.frame[i]] = 1.0

@@ -3,8 +3,6 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from sealag.kernels._jit import entry, inner
 from sealag.kernels.dynamics import (
     Frames,
@@ -16,7 +14,7 @@ from sealag.kernels.dynamics import (
     rigid_body_terms,
 )
 from sealag.kernels.linalg import copy, eliminate, multiply
-from sealag.kernels.operational_space import Space, divide, operational_space, task_torque
+from sealag.kernels.operational_space import Space, operational_space, task_torque
 from sealag.kernels.spatial import integrate
 from sealag.kernels.task_error import frame_error, leave_to_higher
 from sealag.typing import Array, IntArray
@@ -67,6 +65,11 @@ class Evaluation(NamedTuple):
     J_t: Array  # (m, nv) task Jacobian
     error: Array  # (m,) x̃
     wanted: Array  # (m,) x_d about the posture's
+    joints: Array  # (n,) joint angles, rad
+    twist: Array  # (6,) error of a frame
+    target: Array  # (m,) x(q̄(θ)), which x̂ follows
+    moved: Array  # (m,) J* Δθ since the tank's last step
+    pull: Array  # (m,) u of the tank
 
 
 class Newton(NamedTuple):
@@ -111,27 +114,13 @@ class Signal(NamedTuple):
     corrected: bool  # whether the tank pays for u's work on the potential
 
 
-@inner
-def control_of(raw_control):
-    """Return the named parts of raw ones; the last is the memory of the space."""
-    tree, mounts, tasks, gains, terms, frames, at, newton, memory = raw_control
-    control = Tasks(*tasks), Gains(*gains), Terms(*terms), Evaluation(*at)
-    tasks, gains, terms, at = control
-    m, c = at.error.size, at.J_s.shape[0]
-    space = divide(memory, terms.nle.size, gains.springs.size, c, m)
-    return Control(
-        Tree(*tree), Mounts(*mounts), tasks, gains, terms, Frames(*frames), at, Newton(*newton),
-        space,
-    )  # fmt: skip
-
-
 @entry
-def tick(raw_control, raw_signal, period, q, angles, out):
+def tick(control, signal, period, q, angles, out):
     """Write the law's torque.
 
     Args:
-        raw_control: the law; where it was last evaluated is written.
-        raw_signal: `Signal`, moved.
+        control: kept `Control`; where it was last evaluated is written.
+        signal: kept `Signal`, moved.
         period: since the last tick, s; a tank pays for it.
         q: (nq,) measured configuration.
         angles: (n,) joint angles if the signal is MEASURED, else motor angles, rad.
@@ -140,28 +129,38 @@ def tick(raw_control, raw_signal, period, q, angles, out):
     Returns:
         EXISTS, SINGULAR_MASS or NO_STATIC_STATE.
     """
-    control, signal = control_of(raw_control), Signal(*raw_signal)
-    status, iterations = EXISTS, 1 if signal.kind == MEASURED else signal.iterations
-    joints, settled = angles.copy(), False
-    for _ in range(iterations):
-        if signal.kind != MEASURED:
-            for i in range(angles.size):
-                joints[i] = angles[i] + signal.sag[i]
-        if not evaluate(control, q, joints, out):
+    return _tick(control.parts, signal.parts, period, q, angles, out)
+
+
+@inner
+def _tick(control, signal, period, q, angles, out):
+    at = control.at
+    # One evaluation serves all signals: what is inlined once is compiled once.
+    wanted = 1 if signal.kind == MEASURED else signal.iterations
+    status, settled, k = EXISTS, False, 0
+    while True:
+        for i in range(angles.size):
+            at.joints[i] = angles[i]
+            if signal.kind != MEASURED and not settled:
+                at.joints[i] += signal.sag[i]
+        if not evaluate(control, q, at.joints, out):
             return SINGULAR_MASS
-        if signal.kind != MEASURED:
-            status, settled = approach_static_state(control, signal, out)
-        if settled or status != EXISTS:
+        if signal.kind == MEASURED or settled:
             break
-    if status != EXISTS or signal.kind == MEASURED:
-        return status
-    _end_search(control, signal, out)
+        k += 1
+        status, settled = approach_static_state(control, signal, out)
+        if status != EXISTS:
+            return status
+        settled = settled or k >= wanted
+        if settled:
+            _end_search(control, signal, out)
+            for r in range(at.error.size):
+                at.target[r] = at.wanted[r] - at.error[r]
+            # Compensation that is fed back is taken at θ, whose gradient it has.
+            if signal.kind != TANK or not control.gains.fed_back:
+                break
     if signal.kind == TANK:
-        target = control.at.wanted - control.at.error
-        # Compensation that is fed back is taken at θ, whose gradient it has.
-        if control.gains.fed_back and not evaluate(control, q, angles, out):
-            return SINGULAR_MASS
-        _follow(control, signal, period, angles, target, out)
+        _follow(control, signal, period, angles, out)
     return EXISTS
 
 
@@ -223,7 +222,7 @@ def _write_torque(control, out):
 @inner
 def _read_tasks(tasks, terms, frames, at):
     """Write Jacobians and errors of all task rows."""
-    both, last = np.empty(6), -1
+    both, last = at.twist, -1
     n = at.along.shape[1]
     first_q, base = at.q.size - n, at.along.shape[0] - n
     for r in range(at.error.size):
@@ -327,7 +326,9 @@ def approach_static_state(control, signal, torque):
         gravity_slope(control.tree, control.terms, space.joint_from_base, newton)
     _write_error_jacobian(control)
     exists = static_step(space.J_star, space.stiffness, gains.springs, torque, signal.sag, newton)
-    size = np.abs(newton.step).max()
+    size = 0.0
+    for i in range(newton.step.size):
+        size = max(size, abs(newton.step[i]))
     if not (exists and size < signal.diverged):
         return NO_STATIC_STATE, True
     return EXISTS, size < signal.settled
@@ -346,22 +347,20 @@ def _end_search(control, signal, out):
 
 
 @inner
-def step_tank(tank, period, moved, wanted, target, stiffness):
+def step_tank(tank, period, at, stiffness):
     """Move x̂ over one period, and the tank's energy with it.
 
     Args:
         tank: moved.
         period: T since the last step, s; at 0 or less u does nothing.
-        moved: (m,) J* Δθ.
-        wanted: (m,) x_d.
-        target: (m,) x(q̄(θ)), which u moves x̂ to.
+        at: moved, wanted and target are read, pull is written.
         stiffness: (m, m) S, symmetric.
     """
+    moved, wanted, target, u = at.moved, at.wanted, at.target, at.pull
     m, flow, x = moved.size, 0.0, tank.position
     if period > 0.0:
         # u of the exact solution of x̂̇ = rate (target − x̂), so that no period is too long.
         pull = -math.expm1(-tank.rate * period) / period
-        u = np.empty(m)
         for r in range(m):
             u[r] = pull * (target[r] - x[r] - moved[r])
         for r in range(m):
@@ -380,19 +379,19 @@ def step_tank(tank, period, moved, wanted, target, stiffness):
 
 
 @inner
-def _follow(control, signal, period, theta, target, out):
+def _follow(control, signal, period, theta, out):
     """Let x̂ follow its target as far as the tank pays, and write the law's torque at x̂."""
     at, J_star = control.at, control.space.J_star
     if signal.started[0]:
-        moved = np.zeros(target.size)
-        for r in range(target.size):
+        at.moved[:] = 0.0
+        for r in range(at.moved.size):
             for i in range(theta.size):
-                moved[r] += J_star[r, i] * (theta[i] - signal.theta[i])
-        step_tank(signal, period, moved, at.wanted, target, control.space.stiffness)
+                at.moved[r] += J_star[r, i] * (theta[i] - signal.theta[i])
+        step_tank(signal, period, at, control.space.stiffness)
     else:
-        copy(target, signal.position)
+        copy(at.target, signal.position)
         signal.started[0] = 1
     copy(theta, signal.theta)
-    for r in range(target.size):
+    for r in range(at.error.size):
         at.error[r] = at.wanted[r] - signal.position[r]
     _write_torque(control, out)

@@ -59,6 +59,16 @@ class Tree(NamedTuple):
     extra: int  # entries of a configuration less those of a velocity
 
 
+class Bodies(NamedTuple):
+    """What is summed from the leaves inwards, about the common point; row 0 is the whole robot."""
+
+    mass: Array  # (N,) kg
+    moment: Array  # (N, 3) mass times place, kg m
+    inertia: Array  # (N, 3, 3) kg m²
+    force: Array  # (N, 6) that moves it at zero v̇ against gravity
+    momentum: Array  # (N, 6)
+
+
 class Terms(NamedTuple):
     """Rigid-body terms at one configuration and velocity, world axes."""
 
@@ -75,6 +85,7 @@ class Terms(NamedTuple):
     com_jacobian: Array  # (3, nv)
     momentum: Array  # (6,) linear, then angular about the centre of mass
     energy: Array  # (2,) KINETIC, POTENTIAL, J
+    bodies: Bodies  # each with all that moves behind its joint
 
 
 class Mounts(NamedTuple):
@@ -95,26 +106,35 @@ class Frames(NamedTuple):
     drift: Array  # (F, 6) classical accelerations at zero v̇, J̇ v
 
 
-class _Bodies(NamedTuple):
-    """What is summed from the leaves inwards, about the common point; row 0 is the whole robot."""
+class Model(NamedTuple):
+    """A robot and its terms."""
 
-    mass: Array  # (N,) kg
-    moment: Array  # (N, 3) mass times place, kg m
-    inertia: Array  # (N, 3, 3) kg m²
-    force: Array  # (N, 6) that moves it at zero v̇ against gravity
-    momentum: Array  # (N, 6)
+    tree: Tree
+    terms: Terms
+
+
+class Placed(NamedTuple):
+    """Frames of a robot and their terms."""
+
+    terms: Terms
+    mounts: Mounts
+    frames: Frames
 
 
 def allocate(tree: Tree) -> Terms:
     """Return zeroed terms of a robot."""
     count, columns = len(tree.kind), sum(6 if kind == FREE else 1 for kind in tree.kind[1:])
     nv = columns - int((tree.column != tree.coordinate).sum())
+    bodies = Bodies(
+        mass=np.zeros(count), moment=np.zeros((count, 3)), inertia=np.zeros((count, 3, 3)),
+        force=np.zeros((count, 6)), momentum=np.zeros((count, 6)),
+    )  # fmt: skip
     return Terms(
         M=np.zeros((nv, nv)), nle=np.zeros(nv), columns=np.zeros((columns, 6)),
         rotation=np.tile(np.eye(3), (count, 1, 1)), position=np.zeros((count, 3)),
         twist=np.zeros((count, 6)), drift=np.zeros((count, 6)), com=np.zeros(3),
         com_velocity=np.zeros(3), com_drift=np.zeros(3), com_jacobian=np.zeros((3, nv)),
-        momentum=np.zeros(6), energy=np.zeros(2),
+        momentum=np.zeros(6), energy=np.zeros(2), bodies=bodies,
     )  # fmt: skip
 
 
@@ -127,9 +147,9 @@ def allocate_frames(count: int, nv: int) -> Frames:
 
 
 @entry
-def evaluate(raw_tree, q, v, raw_terms):
-    """Write the terms of a robot at q (nq,), v (nv,)."""
-    rigid_body_terms(Tree(*raw_tree), q, v, Terms(*raw_terms))
+def evaluate(model, q, v):
+    """Write the terms of a kept `Model` at q (nq,), v (nv,)."""
+    rigid_body_terms(model.parts.tree, q, v, model.parts.terms)
 
 
 @inner
@@ -142,12 +162,9 @@ def rigid_body_terms(tree, q, v, terms):
         v: (nv,) velocity.
         terms: written.
     """
-    count = tree.kind.size
-    bodies = _Bodies(
-        np.zeros(count), np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 6)),
-        np.empty((count, 6)),
-    )  # fmt: skip
-    bodies.momentum[0] = 0.0
+    count, bodies = tree.kind.size, terms.bodies
+    bodies.mass[0], bodies.moment[0], bodies.inertia[0] = 0.0, 0.0, 0.0
+    bodies.force[0], bodies.momentum[0] = 0.0, 0.0
     terms.drift[0, 2] = GRAVITY
     terms.columns[:] = 0.0
     for j in range(1, count):
@@ -320,9 +337,9 @@ def _sum_up(bodies, v, terms):
 
 
 @entry
-def frames(raw_terms, raw_mounts, raw_frames):
-    """Write Jacobian, rotation, position and J̇ v of frames."""
-    frame_terms(Terms(*raw_terms), Mounts(*raw_mounts), Frames(*raw_frames))
+def frames(placed):
+    """Write Jacobian, rotation, position and J̇ v of frames that are kept as `Placed`."""
+    frame_terms(placed.parts.terms, placed.parts.mounts, placed.parts.frames)
 
 
 @inner
@@ -363,9 +380,9 @@ def frame_terms(terms, mounts, frames):
 
 
 @entry
-def gravity_gradient(raw_tree, raw_terms, H):
-    """Write ∂²V/∂q² (nv, nv), see `gravity_hessian`."""
-    gravity_hessian(Tree(*raw_tree), Terms(*raw_terms), H)
+def gravity_gradient(model, H):
+    """Write ∂²V/∂q² (nv, nv) of a kept `Model`, see `gravity_hessian`."""
+    gravity_hessian(model.parts.tree, model.parts.terms, H)
 
 
 @inner
@@ -381,20 +398,14 @@ def gravity_hessian(tree, terms, H):
         terms: of it, evaluated.
         H: (nv, nv) Nm/rad, written.
     """
-    columns, origin = terms.columns, vector(terms.position, 1)
-    weight, moment = np.zeros(tree.kind.size), np.zeros((tree.kind.size, 3))
+    columns, bodies = terms.columns, terms.bodies
     H[:] = 0.0
     for j in range(tree.kind.size - 1, 0, -1):
-        parent, first = tree.parent[j], tree.column[j]
-        shift, own = tree.coordinate[j] - first, GRAVITY * tree.mass[j]
-        R = rotation(terms.rotation, j)
-        arm = subtract(add(vector(terms.position, j), rotate(R, vector(tree.lever, j))), origin)
-        weight[j] += own
-        put_vector(moment, j, add(vector(moment, j), scale(own, arm)))
+        first = tree.column[j]
+        shift, moment = tree.coordinate[j] - first, vector(bodies.moment, j)
         for c in range(first, first + (6 if tree.kind[j] == FREE else 1)):
-            x, y, _ = add(
-                scale(weight[j], linear(columns, c)), cross(angular(columns, c), vector(moment, j))
-            )
+            push = scale(bodies.mass[j], linear(columns, c))
+            x, y, _ = scale(GRAVITY, add(push, cross(angular(columns, c), moment)))
             i = j
             while i > 0:
                 start, part = tree.column[i], 0.5 if i == j else 1.0
@@ -404,5 +415,3 @@ def gravity_hessian(tree, terms, H):
                     H[c + shift, of] += value
                     H[of, c + shift] += value
                 i = tree.parent[i]
-        weight[parent] += weight[j]
-        put_vector(moment, parent, add(vector(moment, parent), vector(moment, j)))

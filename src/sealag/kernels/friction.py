@@ -32,7 +32,7 @@ _SINKING = 1e3  # times the compliance: how fast a sole's point may sink beside 
 class Surfaces(NamedTuple):
     """Friction of P contact points on F feet."""
 
-    foot: IntArray  # (P,) number of the point's foot
+    foot: IntArray  # (≥ P,) number of the point's foot
     friction: Array  # (P,) Coulomb coefficient
     ridge: Array  # (P,) relative compliance that shares force between redundant points
     torsion_damping: Array  # (F,) torque about the normal per rate, Nms/rad
@@ -61,17 +61,16 @@ class Equations(NamedTuple):
     high: Array  # (P,)
 
 
-@inner
-def allocate_equations(nv, points, feet):
+def allocate_equations(nv: int, points: int, feet: int) -> Equations:
     """Return memory for the contact equations of points on feet."""
     size = 3 * points
-    square = np.zeros((3, size, size))
-    G, H, factor = square[0], square[1], square[2]
     return Equations(
-        np.zeros((nv, nv)), np.zeros((points, 3, nv)), np.zeros((points, 3)), np.zeros(nv),
-        np.zeros((feet, nv)), np.zeros(feet), np.zeros(feet), np.zeros(size, np.int64),
-        np.zeros(size, np.int64), G, H, factor, np.zeros(size), np.zeros(size), np.zeros(size),
-        np.zeros(points), np.zeros(points),
+        L=np.zeros((nv, nv)), rows=np.zeros((points, 3, nv)), target=np.zeros((points, 3)),
+        free=np.zeros(nv), twist_rows=np.zeros((feet, nv)), spin=np.zeros(feet),
+        torque=np.zeros(feet), point=np.zeros(size, np.int64), axis=np.zeros(size, np.int64),
+        G=np.zeros((size, size)), H=np.zeros((size, size)), factor=np.zeros((size, size)),
+        right=np.zeros(size), f=np.zeros(size), slope=np.zeros(size), low=np.zeros(points),
+        high=np.zeros(points),
     )  # fmt: skip
 
 

@@ -26,6 +26,15 @@ def copy(source, target):
 
 
 @inner
+def trace(A):
+    """Return the trace of A (n, n)."""
+    total = 0.0
+    for i in range(A.shape[0]):
+        total += A[i, i]
+    return total
+
+
+@inner
 def multiply(A, B, out):
     """out = A B for C-contiguous A (m, k), B (k, n), out (m, n)."""
     m, k = A.shape
@@ -200,18 +209,16 @@ def _factor(A, L, left):
 
     It ends where what is left of every diagonal entry is rounding.
     """
-    n = A.shape[0]
-    trace = 0.0
+    n, whole = A.shape[0], trace(A)
     for i in range(n):
         left[i] = A[i, i]
-        trace += A[i, i]
     for r in range(n):
         p = 0
         for i in range(1, n):
             if left[i] > left[p]:
                 p = i
-        if not left[p] > _ROUNDING * max(trace, 0.0):
-            return r, trace
+        if not left[p] > _ROUNDING * max(whole, 0.0):
+            return r, whole
         copy(A[p], L[r])
         for k in range(r):
             factor = L[k, p]
@@ -222,7 +229,7 @@ def _factor(A, L, left):
             L[r, i] *= scale
             left[i] -= L[r, i] * L[r, i]
         left[p] = 0.0
-    return n, trace
+    return n, whole
 
 
 @inner
@@ -236,7 +243,7 @@ def invert_low_rank(A, threshold, out, scratch, values):
         A: (n, n), kept.
         threshold: eigenvalues up to this count as zero.
         out: (n, n), written.
-        scratch: (5, n, n).
+        scratch: (5, n²).
         values: (≥ n,) scratch.
 
     Returns:
@@ -245,17 +252,16 @@ def invert_low_rank(A, threshold, out, scratch, values):
         trace is rounding, and λ_r ≥ 1 / trace G⁻¹ is above the threshold.
     """
     n = A.shape[0]
-    r, trace = _factor(A, scratch[0], values)
-    L, W = scratch[0][:r], scratch[1][:r]
-    G = scratch[2].ravel()[: r * r].reshape(r, r)
-    G_inverse = scratch[3].ravel()[: r * r].reshape(r, r)
+    r, whole = _factor(A, scratch[0].reshape(n, n), values)
+    L, W = scratch[0][: r * n].reshape(r, n), scratch[1][: r * n].reshape(r, n)
+    G, G_inverse = scratch[2][: r * r].reshape(r, r), scratch[3][: r * r].reshape(r, r)
     multiply_transposed(L, L, G)
-    if not invert_spd(G, G_inverse, scratch[4].ravel()[: r * r].reshape(r, r)):
+    if not invert_spd(G, G_inverse, scratch[4][: r * r].reshape(r, r)):
         return -1
     weakest = 0.0
     for i in range(r):
         weakest += G_inverse[i, i]
-    if weakest * max(threshold, trace / _WORST_CONDITION) >= 1.0:
+    if weakest * max(threshold, whole / _WORST_CONDITION) >= 1.0:
         return -1
     multiply(G_inverse, L, W)
     out[:, :] = 0.0
@@ -271,11 +277,12 @@ def invert_low_rank(A, threshold, out, scratch, values):
 def pseudo_inverse(A, threshold, out, scratch, values):
     """out = A⁺; eigenvalues only where `invert_low_rank` gives no answer. A is overwritten."""
     if invert_low_rank(A, threshold, out, scratch, values) < 0:
-        pseudo_inverse_psd(A, threshold, out, scratch[0], values, scratch[1])
+        root, vectors = scratch[0].reshape(A.shape), scratch[1].reshape(A.shape)
+        pseudo_inverse_psd(A, threshold, out, root, values, vectors)
 
 
 @inner
-def least_squares(A, r, damping, x):
+def least_squares(A, r, damping, x, scratch):
     """Write the least-squares solution x (m,) of A x = r, damped where A is nearly singular.
 
     Args:
@@ -283,9 +290,10 @@ def least_squares(A, r, damping, x):
         r: (m,).
         damping: share of the trace of AᵀA that is added to it.
         x: (m,), written; not a number if A is not finite.
+        scratch: (2, m, m).
     """
     m = A.shape[0]
-    G, L = np.empty((m, m)), np.zeros((m, m))
+    G, L = scratch[0], scratch[1]
     G[:] = 0.0
     x[:] = 0.0
     for k in range(m):
@@ -295,11 +303,9 @@ def least_squares(A, r, damping, x):
             if a != 0.0:
                 for j in range(i + 1):
                     G[i, j] += a * A[k, j]
-    trace = 0.0
+    ridge = damping * trace(G) + 1e-300
     for i in range(m):
-        trace += G[i, i]
-    for i in range(m):
-        G[i, i] += damping * trace + 1e-300
+        G[i, i] += ridge
     if not cholesky(G, L):
         x[:] = np.nan
         return

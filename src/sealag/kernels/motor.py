@@ -106,10 +106,9 @@ class Series(NamedTuple):
     values: Array  # (3, places) of the three
 
 
-@inner
-def allocate_series():
+def allocate_series() -> Series:
     """Return memory for one rotor's series."""
-    return Series(np.empty(_TERMS), np.empty(_TERMS), np.empty(_TERMS), np.empty((3, 8)))
+    return Series(*(np.zeros(_TERMS) for _ in range(3)), np.zeros((3, len(_PLACES))))
 
 
 @inner
@@ -165,10 +164,11 @@ def rate_rows(raw_motors, instant, speed, torque):
     motors = Motors(*raw_motors)
     for j in range(speed.shape[1]):
         for cause in range(6):
-            one = np.zeros(6)
-            one[cause] = 1.0
-            rotor, drive = Rotor(one[0], one[1], one[2]), Drive(False, False, one[5], 0.0)
-            moved, _, _ = rates(motors, j, instant, drive, rotor, one[3], one[4])
+            angle, turn, drives, link, link_speed, command = [
+                1.0 if cause == k else 0.0 for k in range(6)
+            ]
+            rotor, drive = Rotor(angle, turn, drives), Drive(False, False, command, 0.0)
+            moved, _, _ = rates(motors, j, instant, drive, rotor, link, link_speed)
             speed[cause, j], torque[cause, j] = moved.speed, moved.torque
 
 

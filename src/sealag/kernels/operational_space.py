@@ -12,8 +12,9 @@ from sealag.kernels.linalg import (
     multiply_transposed,
     pseudo_inverse,
     pseudo_inverse_psd,
+    trace,
 )
-from sealag.typing import Array
+from sealag.typing import Array, IntArray
 
 SYMMETRIC, PUBLISHED, FORCE = 0, 1, 2
 
@@ -35,14 +36,15 @@ class Space(NamedTuple):
     phi: Array  # (n, n) φ* = U P_1 Uᵀ
     phi_inverse: Array  # (n, n)
     phi_copy: Array  # (n, n) scratch
-    scratch_n: Array  # (5, n, n)
+    scratch_n: Array  # (5, n²)
     contact_mobility: Array  # (c, c) J_s M⁻¹ J_sᵀ
     contact_inertia: Array  # (c, c) its pseudo-inverse
-    scratch_c: Array  # (5, c, c)
-    square_m: Array  # (5, m, m) scratch
+    scratch_c: Array  # (5, c²)
+    square_m: Array  # (5, m²) scratch
     moved_c: Array  # (c, nv) J_s M⁻¹
     wide_c: Array  # (c, nv) scratch
     wide_m: Array  # (m, nv)
+    low_m: Array  # (m, n)
     tall_n: Array  # (nv, n)
     values: Array  # (max(n, c, m),)
 
@@ -67,54 +69,38 @@ class StackedSpaces(NamedTuple):
     lift: Array  # (N, m, nv) rows of Λ_k J_k P_k
 
 
-@entry
-def memory_size(nv, n, c, m):
-    """Return how many numbers `divide` divides."""
-    wide = nv * (n + m + 2 * nv) + n * (m + 1) + 2 * m * m
-    return wide + 8 * n * n + 7 * c * c + 5 * m * m + (2 * c + m + n) * nv + max(n, c, m, 1)
+class Stack(NamedTuple):
+    """N operational spaces, one after the other."""
+
+    terms: StackedTerms
+    K_x: Array  # as in `operational_space`, with levels, form, star and tolerance
+    levels: IntArray
+    form: int
+    star: bool
+    tolerance: float
+    out: StackedSpaces  # written
+    space: Space  # scratch
 
 
-@entry
-def divide(memory, nv, n, c, m):
-    """Return the arrays of one operational space, views of one memory.
+def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
+    """Return the arrays of one operational space.
 
     Args:
-        memory: (memory_size,).
         nv: number of velocities.
         n: number of actuated joints.
         c: number of contact rows.
         m: number of task rows.
     """
-    J_star, memory = memory[: m * n].reshape(m, n), memory[m * n :]
-    Lambda, memory = memory[: m * m].reshape(m, m), memory[m * m :]
-    stiffness, memory = memory[: m * m].reshape(m, m), memory[m * m :]
-    joint_from_base, memory = memory[: nv * n].reshape(nv, n), memory[nv * n :]
-    lift, memory = memory[: m * nv].reshape(m, nv), memory[m * nv :]
-    gravity, memory = memory[:n], memory[n:]
-    M_inverse, memory = memory[: nv * nv].reshape(nv, nv), memory[nv * nv :]
-    P, memory = memory[: nv * nv].reshape(nv, nv), memory[nv * nv :]
-    phi, memory = memory[: n * n].reshape(n, n), memory[n * n :]
-    phi_inverse, memory = memory[: n * n].reshape(n, n), memory[n * n :]
-    phi_copy, memory = memory[: n * n].reshape(n, n), memory[n * n :]
-    scratch_n, memory = memory[: 5 * n * n].reshape(5, n, n), memory[5 * n * n :]
-    contact_mobility, memory = memory[: c * c].reshape(c, c), memory[c * c :]
-    contact_inertia, memory = memory[: c * c].reshape(c, c), memory[c * c :]
-    scratch_c, memory = memory[: 5 * c * c].reshape(5, c, c), memory[5 * c * c :]
-    square_m, memory = memory[: 5 * m * m].reshape(5, m, m), memory[5 * m * m :]
-    moved_c, memory = memory[: c * nv].reshape(c, nv), memory[c * nv :]
-    wide_c, memory = memory[: c * nv].reshape(c, nv), memory[c * nv :]
-    wide_m, memory = memory[: m * nv].reshape(m, nv), memory[m * nv :]
-    tall_n, values = memory[: nv * n].reshape(nv, n), memory[nv * n :]
     return Space(
-        J_star, Lambda, stiffness, joint_from_base, lift, gravity, M_inverse, P, phi, phi_inverse,
-        phi_copy, scratch_n, contact_mobility, contact_inertia, scratch_c, square_m, moved_c,
-        wide_c, wide_m, tall_n, values,
+        J_star=np.zeros((m, n)), Lambda=np.zeros((m, m)), stiffness=np.zeros((m, m)),
+        joint_from_base=np.zeros((nv, n)), lift=np.zeros((m, nv)), gravity=np.zeros(n),
+        M_inverse=np.zeros((nv, nv)), P=np.zeros((nv, nv)), phi=np.zeros((n, n)),
+        phi_inverse=np.zeros((n, n)), phi_copy=np.zeros((n, n)), scratch_n=np.zeros((5, n * n)),
+        contact_mobility=np.zeros((c, c)), contact_inertia=np.zeros((c, c)),
+        scratch_c=np.zeros((5, c * c)), square_m=np.zeros((5, m * m)), moved_c=np.zeros((c, nv)),
+        wide_c=np.zeros((c, nv)), wide_m=np.zeros((m, nv)), low_m=np.zeros((m, n)),
+        tall_n=np.zeros((nv, n)), values=np.zeros(max(n, c, m, 1)),
     )  # fmt: skip
-
-
-def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
-    """Allocate the arrays of one operational space, see `divide`."""
-    return divide(np.zeros(memory_size(nv, n, c, m)), nv, n, c, m)
 
 
 @inner
@@ -143,7 +129,7 @@ def _constrain(M, J_s, tolerance, space):
     A, A_inverse = space.contact_mobility, space.contact_inertia
     multiply(J_s, P, X)
     multiply_transposed(X, J_s, A)
-    threshold = tolerance * np.trace(A)
+    threshold = tolerance * trace(A)
     pseudo_inverse(A, threshold, A_inverse, space.scratch_c, space.values)
     _subtract_projection(P, X, A_inverse, scratch)
     return True
@@ -237,11 +223,11 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
     base = nv - n
     X, scratch = space.wide_m[:size], space.lift[first:last]
     multiply(J_t[first:last], P, X)
-    H = space.square_m[0].ravel()[: size * size].reshape(size, size)
-    Lambda = space.square_m[1].ravel()[: size * size].reshape(size, size)
-    root = space.square_m[2].ravel()[: size * size].reshape(size, size)
-    vectors = space.square_m[3].ravel()[: size * size].reshape(size, size)
-    block = space.square_m[4].ravel()[: size * size].reshape(size, size)
+    H = space.square_m[0][: size * size].reshape(size, size)
+    Lambda = space.square_m[1][: size * size].reshape(size, size)
+    root = space.square_m[2][: size * size].reshape(size, size)
+    vectors = space.square_m[3][: size * size].reshape(size, size)
+    block = space.square_m[4][: size * size].reshape(size, size)
     multiply_transposed(X, J_t[first:last], H)
     threshold = tolerance * _mobility(J_t[first:last], space.M_inverse)
     pseudo_inverse_psd(H, threshold, Lambda, root, space.values, vectors)
@@ -253,7 +239,7 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
             space.J_star[first + r, j] = total
     _subtract_projection(P, X, Lambda, scratch)
     if star:
-        J_phi = X.ravel()[: size * n].reshape(size, n)
+        J_phi = space.low_m[:size]
         multiply(space.J_star[first:last], space.phi, J_phi)
         multiply_transposed(J_phi, space.J_star[first:last], H)
         pseudo_inverse_psd(H, threshold, Lambda, root, space.values, vectors)
@@ -269,24 +255,22 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
 
 
 @entry
-def operational_spaces(raw_terms, K_x, levels, form, star, tolerance, raw_out):
-    """`operational_space` at N instants, one after the other.
-
-    Args:
-        raw_terms: `StackedTerms`.
-        K_x: as in `operational_space`, with levels, form, star and tolerance.
-        raw_out: `StackedSpaces`, written.
+def operational_spaces(stack):
+    """`operational_space` at the instants of a kept `Stack`.
 
     Returns:
         The first instant at which M is not positive definite, or -1.
     """
-    terms, out = StackedTerms(*raw_terms), StackedSpaces(*raw_out)
-    nv, n, c, m = terms.M.shape[2], out.J_star.shape[2], terms.J_s.shape[1], terms.J_t.shape[1]
-    space = divide(np.zeros(memory_size(nv, n, c, m)), nv, n, c, m)
+    return _operational_spaces(stack.parts)
+
+
+@inner
+def _operational_spaces(stack):
+    terms, out, space = stack.terms, stack.out, stack.space
     for k in range(terms.M.shape[0]):
         if not operational_space(
-            terms.M[k], terms.g[k], terms.J_s[k], terms.J_t[k], K_x, levels, form, star, tolerance,
-            space,
+            terms.M[k], terms.g[k], terms.J_s[k], terms.J_t[k], stack.K_x, stack.levels,
+            stack.form, stack.star, stack.tolerance, space,
         ):  # fmt: skip
             return k
         copy(space.J_star, out.J_star[k])

@@ -13,19 +13,24 @@ from sealag.kernels import motor, spatial
 from sealag.kernels._jit import entry, inner
 from sealag.kernels.contact import (
     Instant,
+    Plant,
+    Work,
     accelerate,
     allocate_work,
-    plant_of,
     resolve,
+    write_measurement,
 )
-from sealag.kernels.dynamics import KINETIC, POTENTIAL, Terms
+from sealag.kernels.dynamics import KINETIC, POTENTIAL
 from sealag.kernels.friction import SETTLED, UNSOLVABLE
 from sealag.kernels.ledger import (
     GRAVITY_STORE,
     IMPACT,
+    JOINT_FLOWS,
     KINETIC_STORE,
     MOTOR_STORE,
+    SCALAR_FLOWS,
     SPRING_STORE,
+    STORES,
     Ledger,
 )
 from sealag.kernels.linalg import copy
@@ -36,10 +41,10 @@ MARGIN = 1e-9
 """m and body weights: a contact this close to changing is at its change. Ten times larger shows in
 the energy that an impact takes; ten times smaller asks more of the bisection than a step has."""
 SAME = 1e-9  # of a step: instants this close are one
-EVALUATE, SETTLE, STRIKE, STEP = range(4)  # what `act` does
+EVALUATE, SETTLE, STRIKE, STEP, STORE = range(5)  # what `act` does
 
 
-class Step(NamedTuple):
+class Memory(NamedTuple):
     """Memory for one step."""
 
     rates: Array  # (4, nv) of the coordinates about the step's start, at the stages
@@ -48,16 +53,63 @@ class Step(NamedTuple):
     displacement: Array  # (nv,)
     angle: Array  # (2, n) motor angles half a step and a step ahead
     speed: Array  # (2, n)
-    gained: Ledger  # works of the step; its stores are not used
+    gained: Ledger  # works of the step; its stores are scratch
     series: Series
+    yielding: Array  # (P,) at the step's beginning
 
 
-@inner
-def allocate_step(nv, gained):
-    n = gained.joint.shape[1]
-    return Step(
-        np.empty((4, nv)), np.empty((4, nv)), np.empty((4, 4)), np.empty(nv), np.empty((2, n)),
-        np.empty((2, n)), gained, motor.allocate_series(),
+class Physics(NamedTuple):
+    """A plant, its state and its books, and memory to move it."""
+
+    plant: Plant
+    work: Work
+    now: Instant
+    following: Instant  # the end of a step that is tried
+    held: Held  # what the drives hold now
+    ledger: Ledger
+    memory: Memory
+
+
+def allocate_ledger(n: int) -> Ledger:
+    """Return empty books of n joints."""
+    return Ledger(
+        joint=np.zeros((len(JOINT_FLOWS), n)), scalar=np.zeros(len(SCALAR_FLOWS)),
+        stores=np.zeros(len(STORES)), moved=np.zeros(1),
+    )  # fmt: skip
+
+
+def allocate_instant(nq: int, nv: int, n: int, *, points: int, total: int) -> Instant:
+    """Return an instant at zero, of P contact points and T points in all."""
+    return Instant(
+        q=np.zeros(nq), v=np.zeros(nv), theta=np.zeros(n), theta_dot=np.zeros(n),
+        tau_motor=np.zeros(n), tau_sea=np.zeros(n), acceleration=np.zeros(nv),
+        force=np.zeros((points, 3)), gap=np.full(points, np.inf), position=np.zeros((total, 3)),
+        velocity=np.zeros((total, 3)), power=np.zeros(4), energy=np.zeros(2),
+    )  # fmt: skip
+
+
+def allocate_physics(plant: Plant, *, instant: bool) -> Physics:
+    """Return a plant at zero with memory to move it.
+
+    Args:
+        plant: the plant.
+        instant: whether torque feedback is not delayed.
+    """
+    work, n, points = allocate_work(plant), len(plant.motors.stiffness), len(plant.contacts.closed)
+    nv, total = len(work.terms.nle), len(plant.contacts.frame)
+    now, following = (
+        allocate_instant(nv + plant.tree.extra, nv, n, points=points, total=total)
+        for _ in range(2)
+    )
+    memory = Memory(
+        rates=np.zeros((4, nv)), accelerations=np.zeros((4, nv)), powers=np.zeros((4, 4)),
+        displacement=np.zeros(nv), angle=np.zeros((2, n)), speed=np.zeros((2, n)),
+        gained=allocate_ledger(n), series=motor.allocate_series(), yielding=np.zeros(points),
+    )  # fmt: skip
+    return Physics(
+        plant=plant, work=work, now=now, following=following,
+        held=Held(command=np.zeros(n), known_torque=np.zeros(n), instant=instant),
+        ledger=allocate_ledger(n), memory=memory,
     )  # fmt: skip
 
 
@@ -82,8 +134,9 @@ def _close(plant, now, held, step, memory, following):
     n = now.theta.size
     first_q, first_v = now.q.size - n, now.v.size - n
     spatial.combine(
-        now.q, now.v, memory.rates, memory.accelerations, step, first_v, following.q, following.v
-    )
+        now.q, now.v, memory.rates, memory.accelerations, step, first_v, memory.displacement,
+        following.q, following.v,
+    )  # fmt: skip
     for j in range(n):
         q, v = first_q + j, first_v + j
         link = motor.link_through(now.q[q], now.v[v], following.q[q], following.v[v], step)
@@ -96,8 +149,10 @@ def _close(plant, now, held, step, memory, following):
 
 
 @inner
-def take_step(plant, work, now, held, step, memory, following):
+def take_step(physics, step):
     """Do a step in the present contact modes; return whether every instant has a solution."""
+    plant, work, now, following = physics.plant, physics.work, physics.now, physics.following
+    held, memory = physics.held, physics.memory
     rates, accelerations, powers = memory.rates, memory.accelerations, memory.powers
     base = now.v.size - now.theta.size
     _predict_motors(plant, now, held, step, memory)
@@ -137,24 +192,26 @@ def _stores(motors, at, out):
 
 
 @inner
-def _update_stores(motors, at, ledger):
-    """Write the stores of an instant, and add how much has moved between them."""
-    before = ledger.stores.copy()
-    _stores(motors, at, ledger.stores)
-    for k in range(before.size):
-        ledger.moved[0] += abs(ledger.stores[k] - before[k])
+def _update_stores(physics):
+    """Write the present stores, and add how much has moved between them."""
+    ledger, now = physics.ledger, physics.memory.gained.stores
+    _stores(physics.plant.motors, physics.now, now)
+    for k in range(now.size):
+        ledger.moved[0] += abs(now[k] - ledger.stores[k])
+        ledger.stores[k] = now[k]
 
 
 @inner
-def accept(motors, following, now, gained, ledger):
+def accept(physics):
     """Take the step's end for the present instant, and book the step."""
+    ledger, gained = physics.ledger, physics.memory.gained
     for k in range(gained.joint.shape[0]):
         for j in range(gained.joint.shape[1]):
             ledger.joint[k, j] += gained.joint[k, j]
     for k in range(IMPACT):
         ledger.scalar[k] += gained.scalar[k]
-    _copy(following, now)
-    _update_stores(motors, now, ledger)
+    _copy(physics.following, physics.now)
+    _update_stores(physics)
 
 
 @inner
@@ -176,44 +233,40 @@ def _copy(source, target):
 
 
 @entry
-def act(raw_plant, raw_terms, raw_instants, what, raw_held, step, raw_gained, touching, impulse):
+def act(kept, what, step, touching, impulse):
     """Do one thing with a plant: all that Python asks of it shares one compilation.
 
     Args:
-        raw_plant: the plant.
-        raw_terms: scratch.
-        raw_instants: the present instant, and the end of a step.
+        kept: `Physics`.
         what: EVALUATE the present instant's dynamics and contact forces; SETTLE which touching
-            points are closed under its forces, or STRIKE them on the ground; try a STEP.
-        raw_held: what the drives hold over a step.
-        step: its length, s.
-        raw_gained: `Ledger` of a step's works, written.
+            points are closed under its forces, or STRIKE them on the ground; try a STEP; or STORE
+            the present energies in the books.
+        step: length of a step, s.
         touching: (P,) points that may be closed.
         impulse: (P, 3) of an impact, Ns, written.
 
     Returns:
         How contacts have settled, as `friction.settle`, and what an impact took, J.
     """
-    plant, work, now, following, gained = unpack(raw_plant, raw_terms, raw_instants, raw_gained)
+    return _act(kept.parts, what, step, touching, impulse)
+
+
+@inner
+def _act(physics, what, step, touching, impulse):
+    plant, work, now = physics.plant, physics.work, physics.now
     if what in (SETTLE, STRIKE):
         return resolve(plant, now, work, touching, what == STRIKE, impulse)
     if what == EVALUATE:
         solved = accelerate(plant, now, work)
+    elif what == STEP:
+        solved = take_step(physics, step)
     else:
-        memory = allocate_step(now.v.size, gained)
-        solved = take_step(plant, work, now, Held(*raw_held), step, memory, following)
+        _update_stores(physics)
+        solved = True
     return SETTLED if solved else UNSOLVABLE, 0.0
 
 
 @entry
-def update_stores(raw_motors, raw_now, raw_ledger):
-    """Write the stores of an instant, and add how much has moved between them."""
-    _update_stores(motor.Motors(*raw_motors), Instant(*raw_now), Ledger(*raw_ledger))
-
-
-@inner
-def unpack(raw_plant, raw_terms, raw_instants, raw_ledger):
-    """Return plant, memory, the present and the following instant, and the books."""
-    plant, (now, following) = plant_of(raw_plant), raw_instants
-    work = allocate_work(plant, Terms(*raw_terms))
-    return plant, work, Instant(*now), Instant(*following), Ledger(*raw_ledger)
+def sense(kept, t, row):
+    """Write what the sensors measure now of `Physics`, see `contact.write_measurement`."""
+    write_measurement(kept.parts.now, kept.parts.plant.contacts, t, row)

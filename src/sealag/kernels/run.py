@@ -17,10 +17,8 @@ from sealag.kernels.contact import (
     write_measurement,
 )
 from sealag.kernels.dynamics import KINETIC
-from sealag.kernels.ledger import Ledger
 from sealag.kernels.linalg import copy
-from sealag.kernels.motor import Held
-from sealag.kernels.plant import MARGIN, SAME, accept, allocate_step, take_step, unpack
+from sealag.kernels.plant import MARGIN, SAME, accept, take_step
 from sealag.typing import Array, IntArray
 
 LOAD, SAMPLE, TICK, TAKE = range(4)  # kinds of events, in their order at one instant
@@ -39,11 +37,9 @@ class Channels(NamedTuple):
     samples: Array  # (R, row) measurements that are on their way, at their tick modulo R
     commands: Array  # (R, n) commands that are on their way, likewise
     sent: Array  # (n,) the last command, Nm
-    acting: Array  # (n,) command that the drives obey, Nm
-    acting_tick: IntArray  # (1,) its tick; -1 for the first command
+    acting_tick: IntArray  # (1,) tick of the command that the drives hold; -1 for the first
     torque_known: Array  # (L,) instant of the spring torque that the drives know; empty if now's
     torque_history: Array  # (H, n) spring torques at the last looks, Nm
-    torque_held: Array  # (n,) the one that they know, Nm
     storage: Array  # (1,) that the controller states, J
     tank: Array  # (1,) energy in its tank, J
     undelayed_work: Array  # (n,) of the command that it would give without delay, J
@@ -115,7 +111,7 @@ def _lost(plant, now, limits):
 
 
 @inner
-def _feed_torque(channels, periods, look, now):
+def _feed_torque(channels, periods, look, now, known):
     """Give the drives the spring torque that reaches their torque feedback now."""
     history, size = channels.torque_history, channels.torque_history.shape[0]
     copy(now.tau_sea, history[look % size])
@@ -124,13 +120,13 @@ def _feed_torque(channels, periods, look, now):
     part, after = max(0.0, place - before), min(before + 1, look)
     for j in range(now.tau_sea.size):
         earlier = history[before % size, j]
-        channels.torque_held[j] = earlier + part * (history[after % size, j] - earlier)
+        known[j] = earlier + part * (history[after % size, j] - earlier)
 
 
 @inner
-def _record(plant, channels, now, time, ledger, log, row):
+def _record(physics, channels, time, log, row):
     """Write a row of the log."""
-    contacts = plant.contacts
+    now, ledger, contacts = physics.now, physics.ledger, physics.plant.contacts
     log.time[row], log.tick[row] = time, channels.acting_tick[0]
     copy(now.q, log.q[row])
     copy(now.v, log.v[row])
@@ -139,7 +135,7 @@ def _record(plant, channels, now, time, ledger, log, row):
     copy(now.tau_motor, log.tau_motor[row])
     copy(now.tau_sea, log.tau_sea[row])
     copy(channels.sent, log.tau_command[row])
-    copy(channels.acting, log.tau_osc[row])
+    copy(physics.held.command, log.tau_osc[row])
     copy(channels.undelayed_work, log.undelayed_work[row])
     copy(now.force, log.contact_force[row])
     copy(ledger.stores, log.stores[row])
@@ -153,15 +149,14 @@ def _record(plant, channels, now, time, ledger, log, row):
 
 
 @inner
-def _happen(plant, channels, now, event):
+def _happen(physics, channels, event):
     """Let an event happen; False if it needs Python."""
     tick = channels.tick[event]
     if channels.kind[event] == SAMPLE:
         row = channels.samples[tick % channels.samples.shape[0]]
-        contacts = plant.contacts
-        write_measurement(now, contacts.closed, contacts.frame, channels.due[event], row)
+        write_measurement(physics.now, physics.plant.contacts, channels.due[event], row)
     elif channels.kind[event] == TAKE:
-        copy(channels.commands[tick % channels.commands.shape[0]], channels.acting)
+        copy(channels.commands[tick % channels.commands.shape[0]], physics.held.command)
         channels.acting_tick[0] = tick
     else:
         return False
@@ -169,11 +164,11 @@ def _happen(plant, channels, now, event):
 
 
 @inner
-def _slide(plant, work, now, held, step, memory, following):
+def _slide(physics, step):
     """Try a step in which no contact changes; False, with all as it was, if one does."""
-    contacts = plant.contacts
-    before = contacts.yielding.copy()
-    if take_step(plant, work, now, held, step, memory, following) and np.isfinite(
+    contacts, following, before = physics.plant.contacts, physics.following, physics.memory.yielding
+    copy(contacts.yielding, before)
+    if take_step(physics, step) and np.isfinite(
         following.energy[KINETIC]
     ):
         measure_gaps(contacts, following)
@@ -187,6 +182,15 @@ def _slide(plant, work, now, held, step, memory, following):
     return False
 
 
+class Course(NamedTuple):
+    """What a run does with a plant, and its log."""
+
+    channels: Channels
+    periods: Periods
+    limits: Limits
+    log: Log
+
+
 class Cursor(NamedTuple):
     """Where a run is."""
 
@@ -197,16 +201,12 @@ class Cursor(NamedTuple):
 
 
 @entry
-def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, cursor, said):
+def glide(kept, course, cursor, said):
     """Go on with a run until something needs Python.
 
     Args:
-        raw_plant: the plant.
-        raw_terms: scratch.
-        raw_instants: the present instant, and scratch for the next.
-        raw_ledger: the books.
-        raw_run: `Channels`, `Periods` and `Limits`, and whether torque feedback is not delayed.
-        raw_log: the log.
+        kept: `Physics`.
+        course: kept `Course`.
         cursor: raw `Cursor`.
         said: instant at which the controller last stated its storage, s; inf if it states none.
 
@@ -215,38 +215,39 @@ def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, curs
         it; STATE if the controller must state its storage for the log; BLOCKED if a step needs
         Python. The present instant, s. And the raw `Cursor`, that of BLOCKED behind the step.
     """
-    plant, work, now, following, ledger = unpack(raw_plant, raw_terms, raw_instants, raw_ledger)
-    raw_channels, raw_periods, raw_limits, instant = raw_run
-    channels, periods, limits = Channels(*raw_channels), Periods(*raw_periods), Limits(*raw_limits)
-    n, log = now.theta.size, Log(*raw_log)
-    gained = Ledger(np.empty((9, n)), np.empty(5), np.empty(4), np.empty(1))
-    memory = allocate_step(now.v.size, gained)
-    held = Held(channels.acting, channels.torque_held, instant)
-    at, same = Cursor(*cursor), SAME * periods.step
+    return _glide(kept.parts, course.parts, Cursor(*cursor), said)
+
+
+@inner
+def _glide(physics, course, at, said):
+    plant, now = physics.plant, physics.now
+    channels, periods, limits, log = course.channels, course.periods, course.limits, course.log
+    same = SAME * periods.step
     time, step, event, part = at.time, at.step, at.event, at.part
     profiled = plant.contacts.ground_x.size > 0 or plant.contacts.closed.size == 0
     while True:
         if part == WATCH:
             part = EVENTS
             if step % periods.watch == 0 and (not profiled or _lost(plant, now, limits)):
-                return FALLEN, time, (time, step, event, part)
+                return FALLEN, time, Cursor(time, step, event, part)
         if part in (EVENTS, INSIDE):
             while event < channels.due.size and channels.due[event] <= time + same:
-                if not _happen(plant, channels, now, event):
-                    return EVENT, time, (time, step, event, part)
+                if not _happen(physics, channels, event):
+                    return EVENT, time, Cursor(time, step, event, part)
                 event += 1
             part = CLOSE if part == EVENTS else MOVE
         if part == CLOSE:
             logged = step % periods.log == 0 or step == periods.steps
             if logged and said != np.inf and said != time:
-                return STATE, time, (time, step, event, part)
+                return STATE, time, Cursor(time, step, event, part)
             if channels.torque_known.size > 0 and step % periods.torque == 0:
-                _feed_torque(channels, periods, step // periods.torque, now)
+                look = step // periods.torque
+                _feed_torque(channels, periods, look, now, physics.held.known_torque)
             if logged:
                 row = (step + periods.log - 1) // periods.log
-                _record(plant, channels, now, time, ledger, log, row)
+                _record(physics, channels, time, log, row)
             if step == periods.steps:
-                return END, time, (time, step, event, part)
+                return END, time, Cursor(time, step, event, part)
             part = MOVE
         begin, end = time, (step + 1) * periods.step
         time, part = end, WATCH
@@ -257,6 +258,6 @@ def glide(raw_plant, raw_terms, raw_instants, raw_ledger, raw_run, raw_log, curs
         span = time - begin
         if abs(span - periods.step) <= same:
             span = periods.step
-        if not (profiled and _slide(plant, work, now, held, span, memory, following)):
-            return BLOCKED, begin, (time, step, event, part)
-        accept(plant.motors, following, now, gained, ledger)
+        if not (profiled and _slide(physics, span)):
+            return BLOCKED, begin, Cursor(time, step, event, part)
+        accept(physics)

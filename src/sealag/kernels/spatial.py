@@ -8,8 +8,6 @@ base, 0 for a fixed one.
 
 import math
 
-import numpy as np
-
 from sealag.kernels._jit import inner
 
 
@@ -212,9 +210,9 @@ def stage(q0, v0, rate, acceleration, step, base, u, q, v, next_rate):
 
 
 @inner
-def combine(q0, v0, rates, accelerations, step, base, q, v):
-    """Close the fourth-order Runge-Kutta step from its four stages' rates and accelerations."""
-    u = np.empty(v0.size)
+def combine(q0, v0, rates, accelerations, step, base, u, q, v):
+    """Close the fourth-order Runge-Kutta step from its four stages' rates and accelerations; u is
+    scratch."""
     for i in range(v0.size):
         u[i] = step / 6.0 * (rates[0, i] + 2.0 * (rates[1, i] + rates[2, i]) + rates[3, i])
         v[i] = v0[i] + step / 6.0 * (

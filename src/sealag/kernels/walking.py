@@ -29,6 +29,14 @@ def quintic(start, end, duration, c):
     c[5] = (6.0 * d0 - 3.0 * d1 * T + 0.5 * d2 * T * T) / T**5
 
 
+@inner
+def quintic_values(c, t):
+    """Return position, rate and acceleration at t (s) of the quintic with coefficients c (6,)."""
+    position = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
+    rate = c[1] + t * (2 * c[2] + t * (3 * c[3] + t * (4 * c[4] + t * 5 * c[5])))
+    return position, rate, 2 * c[2] + t * (6 * c[3] + t * (12 * c[4] + t * 20 * c[5]))
+
+
 @entry
 def quintic_at(c, t, out):
     """Write position, rate and acceleration (3,) of a quintic at a time.
@@ -38,9 +46,7 @@ def quintic_at(c, t, out):
         t: s.
         out: (3,), written.
     """
-    out[0] = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
-    out[1] = c[1] + t * (2 * c[2] + t * (3 * c[3] + t * (4 * c[4] + t * 5 * c[5])))
-    out[2] = 2 * c[2] + t * (6 * c[3] + t * (12 * c[4] + t * 20 * c[5]))
+    out[0], out[1], out[2] = quintic_values(c, t)
 
 
 @inner
@@ -64,14 +70,13 @@ def pendulum(x, v, begin, end, transfer, old, new, height, offset, steps):
     """
     if end <= begin:
         return
-    z = np.empty(3)
     h = (end - begin) / steps
     for i in range(steps):
         t = begin + (i + 0.5) * h
-        quintic_at(height, t - offset, z)
+        level, _, lift = quintic_values(height, t - offset)
         s = min(t / transfer, 1.0) if transfer > 0.0 else 1.0
-        arm = max(z[0] - old[2] - s * (new[2] - old[2]), 0.3)
-        rate2 = max(GRAVITY + z[2], 1.0) / arm
+        arm = max(level - old[2] - s * (new[2] - old[2]), 0.3)
+        rate2 = max(GRAVITY + lift, 1.0) / arm
         for k in range(2):
             p = old[k] + s * (new[k] - old[k])
             a = rate2 * (x[k] + 0.5 * h * v[k] - p)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from sealag.kernels import keep
 from sealag.robot._mimic import Coupling
 from sealag.robot._tree import frame_mounts
 from sealag.typing import Array
@@ -41,14 +42,14 @@ class Workspace:
         """
         from sealag.kernels import dynamics
 
-        self._model, self._raw_tree, self._kernel = model, tuple(tree), dynamics
+        self._model, self._kernel = model, dynamics
         self._coupling = coupling
         self._data = model.createData()
         self._frames: dict[str, _Frame] = {}
         self.nv, self.nv_base = coupling.T.shape[1], nv_base
         self._q = coupling.restrict(pin.neutral(model))
         self.terms = dynamics.allocate(tree)
-        self._raw_terms = tuple(self.terms)
+        self._kept = keep(dynamics.Model(tree, self.terms))
         self.M, self.nle, self.momentum = self.terms.M, self.terms.nle, self.terms.momentum
         self.com, self.com_velocity = self.terms.com, self.terms.com_velocity
         self._weight = dynamics.GRAVITY * sum(inertia.mass for inertia in model.inertias[1:])
@@ -61,7 +62,7 @@ class Workspace:
             v: (nv,) velocity.
         """
         self._q = q
-        self._kernel.evaluate(self._raw_tree, q, v, self._raw_terms)
+        self._kernel.evaluate(self._kept, q, v)
 
     @property
     def kinetic_energy(self) -> float:
@@ -80,7 +81,7 @@ class Workspace:
     def gravity_gradient(self) -> Array:
         """Return ∂g/∂q (nv, nv) as `sealag.robot.Robot.gravity_gradient`; new memory."""
         H = np.empty((self.nv, self.nv))
-        self._kernel.gravity_gradient(self._raw_tree, self._raw_terms, H)
+        self._kernel.gravity_gradient(self._kept, H)
         return H
 
     def com_jacobian(self) -> Array:
@@ -144,11 +145,11 @@ class Workspace:
         """Return what is known of a frame now."""
         found = self._frames.get(name)
         if found is None:
-            found = self._frames[name] = _Frame(
-                mounts=frame_mounts(self._model, self._coupling, [name]),
-                terms=self._kernel.allocate_frames(1, self.nv),
-            )
-        self._kernel.frames(self._raw_terms, tuple(found.mounts), tuple(found.terms))
+            mounts = frame_mounts(self._model, self._coupling, [name])
+            terms = self._kernel.allocate_frames(1, self.nv)
+            kept = keep(self._kernel.Placed(self.terms, mounts, terms))
+            found = self._frames[name] = _Frame(mounts=mounts, terms=terms, kept=kept)
+        self._kernel.frames(found.kept)
         return found
 
 
@@ -158,3 +159,4 @@ class _Frame:
 
     mounts: "Mounts"
     terms: "Frames"
+    kept: Any

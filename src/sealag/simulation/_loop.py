@@ -8,6 +8,7 @@ import numpy as np
 
 from sealag.actuation import Actuators
 from sealag.errors import InputError, SealagError, SolverError
+from sealag.kernels import keep
 from sealag.robot import Robot
 from sealag.simulation._audit import Stated, UndelayedWork, audit
 from sealag.simulation._exchange import Exchanges
@@ -185,6 +186,7 @@ class _Loop:
     def _plan(self, steps: int, every: int) -> None:
         """Lay out all that happens: loads, samples, ticks and takings, and what is logged."""
         kernel, step = self._kernel, self.clock.physics
+        self.plant.held.command[:], self.plant.held.known_torque[:] = self.first, 0.0
         self._log = allocate_log(self.plant, -(-steps // every) + 1)  # too long a run ends here
         ways = Exchanges.plan(self._network, self.clock, duration=steps * step, seed=self.seed)
         self.exchanges = ways
@@ -201,7 +203,12 @@ class _Loop:
             first=self.first, torque=self.plant.now.tau_sea, row=self.truth.data.size,
             work=self._given.work,
         )  # fmt: skip
-        self._raw = tuple(map(tuple, (self._channels, self._limits, self._log)))
+        self._course = self._course_of(self._periods)
+
+    def _course_of(self, periods: "Periods") -> Any:
+        """Return the run of some length, as kernels take it."""
+        kernel = self._kernel
+        return keep(kernel.Course(self._channels, periods, self._limits, self._log))
 
     def _fall_limits(self) -> "Limits":
         fall, height, tilt, up = self.scene.fall, -math.inf, -math.inf, np.zeros((1, 3))
@@ -243,19 +250,10 @@ class _Loop:
         except KeyboardInterrupt:
             outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
         if not self._filled():
-            end, still = len(self._channels.due), self._periods._replace(steps=0)
-            self._enter((0.0, 0, end, self._kernel.CLOSE), still, math.inf)
+            still = self._course_of(self._periods._replace(steps=0))
+            closing = (0.0, 0, len(self._channels.due), self._kernel.CLOSE)
+            self._kernel.glide(self.plant.physics, still, closing, math.inf)
         return self._result(outcome, message)
-
-    def _enter(
-        self, cursor: tuple[float, int, int, int], periods: "Periods", said: float
-    ) -> tuple[int, float, tuple[float, int, int, int]]:
-        """Enter the compiled loop at a raw cursor; return why it was left, when, and where."""
-        plant, (channels, limits, log) = self.plant, self._raw
-        return self._kernel.glide(
-            plant.raw, plant.raw_terms, plant.raw_instants, plant.raw_ledger,
-            (channels, tuple(periods), limits, plant.instant_feedback), log, cursor, said,
-        )  # fmt: skip
 
     def _filled(self) -> int:
         """How many instants are logged."""
@@ -264,10 +262,10 @@ class _Loop:
     def _glide(self, progress: Callable[[float], None] | None) -> None:
         """Go on from one thing that needs Python to the next, until the end."""
         kernel, plant, channels = self._kernel, self.plant, self._channels
-        cursor = (0.0, 0, 0, kernel.WATCH)
+        cursor, course = (0.0, 0, 0, kernel.WATCH), self._course
         shown, every = 0, max(1, round(0.1 / self.clock.physics))
         while True:
-            why, plant.time, cursor = self._enter(cursor, self._periods, self._said)
+            why, plant.time, cursor = kernel.glide(plant.physics, course, cursor, self._said)
             time, step, event, part = cursor
             if progress is not None and step > shown:  # what was there then is logged
                 progress(plant.time)
@@ -279,7 +277,7 @@ class _Loop:
             elif why == kernel.STATE:
                 self._state()
             elif why == kernel.BLOCKED:
-                plant.advance(time, channels.acting, channels.torque_held)
+                plant.advance(time, plant.held.command, plant.held.known_torque)
             else:
                 cursor = (time, step, event + 1, part)
                 if channels.kind[event] == kernel.TICK:

@@ -15,7 +15,8 @@ import numpy as np
 
 from sealag.actuation import Actuators, motors_of
 from sealag.errors import InputError
-from sealag.kernels.ledger import IMPACT, JOINT_FLOWS, SCALAR_FLOWS, STORES, Ledger
+from sealag.kernels import keep
+from sealag.kernels.ledger import IMPACT
 from sealag.robot import Robot
 from sealag.simulation._contacts import Surroundings
 from sealag.simulation._ground import Foot
@@ -25,7 +26,6 @@ from sealag.walking import Ground, GroundProfile
 
 if TYPE_CHECKING:
     from sealag.kernels.contact import Instant
-    from sealag.kernels.plant import Held
 
 FASTEST = 1e4  # rad/s, m/s: beyond any physical range
 _EVENTS_PER_STEP = 60
@@ -82,7 +82,7 @@ class Plant:
         delayed_torque_feedback: bool = False,
         stabilisation: float = 50.0,
     ) -> None:
-        from sealag.kernels import contact, dynamics, friction, plant
+        from sealag.kernels import contact, friction, plant
 
         if not (np.isfinite(step) and step > 0):
             raise InputError(f"the step must be a time > 0 s, got {step}")
@@ -91,36 +91,22 @@ class Plant:
                 f"actuators are for joints {list(actuators.joints)}, "
                 f"the robot has {list(robot.joints)}"
             )
-        self._kernel, self._contact, self._friction = plant, contact, friction
+        self._kernel, self._friction = plant, friction
         self.robot, self.actuators, self.step_length = robot, actuators, step
         self.surroundings = Surroundings(
             robot, feet, ground or GroundProfile(), loaded_frames, stabilisation=stabilisation,
             stop_time=step,
         )  # fmt: skip
         self.contacts, mounts = self.surroundings.contacts, self.surroundings.mounts
-        self.time, self.instant_feedback = 0.0, not delayed_torque_feedback
-        self._motors, n = motors_of(actuators, robot.damping), robot.n
-        parts = (robot.tree, mounts, self._motors, self.contacts)
-        self.raw = tuple(tuple(part) for part in parts)
-        self.raw_terms = tuple(dynamics.allocate(robot.tree))
-        self.now, self._next = (self._allocate() for _ in range(2))
-        self.raw_instants = tuple(self.now), tuple(self._next)
-        shapes = (len(JOINT_FLOWS), n), (len(SCALAR_FLOWS),), (len(STORES),), (1,)
-        self.ledger, self._gained = (Ledger(*map(np.zeros, shapes)) for _ in range(2))
-        self.raw_ledger, self._raw_gained = tuple(self.ledger), tuple(self._gained)
-        self._idle = plant.Held(np.zeros(n), np.zeros(n), self.instant_feedback)
+        self.time = 0.0
+        motors = motors_of(actuators, robot.damping)
+        parts = contact.Plant(robot.tree, mounts, motors, self.contacts)
+        physics = plant.allocate_physics(parts, instant=not delayed_torque_feedback)
+        self.now, self._next, self.held = physics.now, physics.following, physics.held
+        self.ledger, self._gained = physics.ledger, physics.memory.gained
+        self.physics = keep(physics)
         self.impulse = np.zeros((self.surroundings.count, 3))
         self.events: list[ContactEvent] = []
-
-    def _allocate(self) -> "Instant":
-        robot, count, total = self.robot, self.surroundings.count, len(self.contacts.frame)
-        n, nv = robot.n, robot.nv
-        return self._contact.Instant(
-            q=np.zeros(robot.nq), v=np.zeros(nv), theta=np.zeros(n), theta_dot=np.zeros(n),
-            tau_motor=np.zeros(n), tau_sea=np.zeros(n), acceleration=np.zeros(nv),
-            force=np.zeros((count, 3)), gap=np.full(count, np.inf), position=np.zeros((total, 3)),
-            velocity=np.zeros((total, 3)), power=np.zeros(4), energy=np.zeros(2),
-        )  # fmt: skip
 
     # State -------------------------------------------------------------------------------------
     def start(
@@ -181,8 +167,7 @@ class Plant:
             t: The time that the measurement says, s.
             out: The row of a `Measurement` with one contact flag for each foot.
         """
-        contacts = self.contacts
-        self._contact.sense(tuple(self.now), contacts.closed, contacts.frame, t, out)
+        self._kernel.sense(self.physics, t, out)
 
     # Motion ------------------------------------------------------------------------------------
     def push(self, load: Array) -> None:
@@ -206,19 +191,19 @@ class Plant:
         Raises:
             PlantStop: The step cannot be completed; the state is that of the last good instant.
         """
-        measured = self.now.tau_sea.copy() if tau_measured is None else tau_measured
-        held = self._kernel.Held(tau_osc, measured, self.instant_feedback)
+        self.held.command[:] = tau_osc
+        self.held.known_torque[:] = self.now.tau_sea if tau_measured is None else tau_measured
         left = instant - self.time
         if abs(left - self.step_length) <= self._kernel.SAME * self.step_length:
             left = self.step_length
         for _ in range(_EVENTS_PER_STEP):
             sliding = self.contacts.yielding.copy()
-            self._try(left, held)
+            self._try(left)
             margin, point = self.surroundings.margin(self._next)
             if margin >= -self._kernel.MARGIN:
                 self._take(left)
                 break
-            done, point = self._locate(left, margin, point, held=held, sliding=sliding)
+            done, point = self._locate(left, margin, point, sliding=sliding)
             self._take(done)
             self._change(point)
             left -= done
@@ -232,9 +217,9 @@ class Plant:
             )
         self.time = instant
 
-    def _try(self, step: float, held: "Held") -> None:
+    def _try(self, step: float) -> None:
         """Fill the next instant with the state one step ahead in the present contact modes."""
-        if self._act(self._kernel.STEP, held=held, step=step)[0]:
+        if self._act(self._kernel.STEP, step=step)[0]:
             raise self._unsolvable(self._next)
         if not math.isfinite(self._next.energy.sum()):
             raise PlantStop(
@@ -252,17 +237,14 @@ class Plant:
         self.time += step
 
     def _update_stores(self) -> None:
-        self._kernel.update_stores(tuple(self._motors), tuple(self.now), self.raw_ledger)
+        self._act(self._kernel.STORE)
 
     def _act(
-        self, what: int, *, held: "Held | None" = None, step: float = 0.0,
-        touching: IntArray | None = None,
-    ) -> tuple[int, float]:  # fmt: skip
+        self, what: int, *, step: float = 0.0, touching: IntArray | None = None
+    ) -> tuple[int, float]:
         """Do one thing, see the kernel."""
-        return self._kernel.act(
-            self.raw, self.raw_terms, self.raw_instants, what, tuple(held or self._idle), step,
-            self._raw_gained, self.contacts.closed if touching is None else touching, self.impulse,
-        )  # fmt: skip
+        mask = self.contacts.closed if touching is None else touching
+        return self._kernel.act(self.physics, what, step, mask, self.impulse)
 
     def _evaluate(self) -> None:
         """Evaluate dynamics and contact forces of the present instant at its q, v and motors."""
@@ -278,7 +260,7 @@ class Plant:
 
     # Contact changes ---------------------------------------------------------------------------
     def _locate(
-        self, step: float, f_high: float, point: int, *, held: "Held", sliding: Array
+        self, step: float, f_high: float, point: int, *, sliding: Array
     ) -> tuple[float, int]:
         """Shorten the step to where the first margin vanishes (Illinois); return length, point."""
         low, high, middle = 0.0, step, step
@@ -290,7 +272,7 @@ class Plant:
             if math.isfinite(f_low):  # else the gap widens there: halve
                 middle = (low * f_high - high * f_low) / (f_high - f_low)
             self.contacts.yielding[:] = sliding
-            self._try(middle, held)
+            self._try(middle)
             value, at = self.surroundings.margin(self._next)
             point = at if value < tolerance else point
             if abs(value) <= tolerance or high - low <= 1e-9 * self.step_length:

@@ -2,14 +2,16 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sealag.actuation import Actuators
 from sealag.errors import InputError, SolverError
+from sealag.kernels import keep
 from sealag.robot import Robot
 from sealag.typing import Array
-from sealag.walking._estimator import Body, Estimator
+from sealag.walking._estimator import Body, Estimator, biped_of
 from sealag.walking._feet import Side
 from sealag.walking._options import (
     JointAngles,
@@ -21,6 +23,9 @@ from sealag.walking._start import walking_start
 from sealag.walking._step import StepReferences
 from sealag.walking._walk import Walking
 from sealag.whole_body import Measurement
+
+if TYPE_CHECKING:
+    from sealag.kernels.walking_law import Gains, Lead
 
 _DAMPING = 1e-9  # share of the trace: bounds torques near a straight knee
 _LATE_SWING = 0.6  # share of the step after which a touch is a touchdown
@@ -70,16 +75,16 @@ class WalkingController:
         self._ground, self._period = walking.ground, period
         self.gait, self.options = walking.gait, walking.options
         self._body = Body(robot, walking.feet)
-        self._torque_limit = np.where(np.isfinite(robot.effort_limit), robot.effort_limit, 1e3)
-        self._D = np.ascontiguousarray(actuators.motor_damping)
-        self._D_by_K = actuators.motor_damping / actuators.spring_stiffness
+        gains, lead = _gains(self.options, period)
+        biped = biped_of(
+            robot, actuators, self._body, walking.feet, period=period, gains=gains, lead=lead
+        )
+        self._biped, self.tau_task, self._first = keep(biped), biped.tau, True
+        self._tau_sea = biped.tau_sea
         self._estimator = Estimator(
-            robot, actuators, period=period, prediction=self.options.prediction,
+            biped, self._biped, period=period, prediction=self.options.prediction,
             odometry=self.options.odometry,
         )  # fmt: skip
-        self._raw_gains, self._raw_lead = _gains(self.options, period)
-        self._rates, self._smooth, self._first = np.zeros(robot.n), np.zeros(robot.n), True
-        self.tau_task = np.zeros(robot.n)
 
     def reset(self, t: float, measurement: Measurement) -> None:
         """Begin at the apex over the foot that is loaded, in the middle of its step.
@@ -142,15 +147,14 @@ class WalkingController:
             if not step.swinging:
                 step.lift(body.foot(step.swing_foot))
             step.move(now, self._period)
-        if not self._tasks(now, phase):
-            raise SolverError("the walking law has no finite torque in this state")
-        if self._first:
-            limit = self._torque_limit
-            self._smooth[:], self._first = self.tau_task.clip(-limit, limit), False
-        self._kernel.carry(
-            self.tau_task, self._torque_limit, self._smooth, self._rates, self._estimator.tau_sea,
-            self._D, self._D_by_K, self._raw_lead, out,
+        reference = self._kernel.Reference(
+            height=step.height, height_time=step.height_time(now), swing=step.swing, phase=phase,
+            transfer_time=self.gait.transfer_time, stance=step.stance,
+            still=not options.acceleration_feedforward,
         )  # fmt: skip
+        if not self._kernel.command(self._biped, tuple(reference), self._first, out):
+            raise SolverError("the walking law has no finite torque in this state")
+        self._first = False
         self._estimator.sent(out, t + age + options.embedded_delay)
 
     def motor_start(self, q: Array, v: Array, *, stance: Side = Side.RIGHT) -> Array:
@@ -183,7 +187,7 @@ class WalkingController:
             measured=measurement.time, now=now,
         )  # fmt: skip
         if options.prediction == Prediction.NONE:
-            self._estimator.tau_sea[:] = measurement.tau_sea
+            self._tau_sea[:] = measurement.tau_sea
 
     def _switch(self, now: float, contact: Array) -> None:
         """Begin the next step as planned, or at an early touchdown of the swing foot."""
@@ -194,46 +198,32 @@ class WalkingController:
             step.change(now, self._body.feet())
             self.placement.restart()
 
-    # Law -----------------------------------------------------------------------------------------
-    def _tasks(self, now: float, phase: float) -> bool:
-        """Set ``tau_task`` and the planned joint rates; return whether they are finite."""
-        body, step = self._body, self.step
-        still = not self.options.acceleration_feedforward
-        reference = self._kernel.Reference(
-            height=step.height, height_time=step.height_time(now), swing=step.swing, phase=phase,
-            transfer_time=self.gait.transfer_time, stance=step.stance, still=still,
-        )  # fmt: skip
-        return self._kernel.law(
-            body.raw_feet, body.v, body.gravity() if still else body.terms.nle, tuple(reference),
-            self._raw_gains, self.tau_task, self._rates,
-        )  # fmt: skip
 
-
-def _gains(options: WalkingOptions, period: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the raw gains and lead that the kernels of law and command take."""
+def _gains(options: WalkingOptions, period: float) -> "tuple[Gains, Lead]":
+    """Return gains and lead of the law."""
     from sealag.kernels.walking_law import Gains, Lead
 
     def damping(stiffness: float) -> float:
         return 2.0 * options.task_damping * math.sqrt(stiffness)
 
     gains = Gains(
-        height_stiffness=options.height_stiffness,
-        posture_stiffness=options.posture_stiffness,
-        swing_stiffness=options.swing_stiffness,
+        height_stiffness=float(options.height_stiffness),
+        posture_stiffness=float(options.posture_stiffness),
+        swing_stiffness=float(options.swing_stiffness),
         height_damping=damping(options.height_stiffness),
         posture_damping=damping(options.posture_stiffness),
         swing_damping=damping(options.swing_stiffness),
         planned=1.0 if options.acceleration_feedforward else 0.0,
-        position_rate=options.position_rate,
+        position_rate=float(options.position_rate),
         damping=_DAMPING,
     )
     lead = Lead(
         keep=math.exp(-period / options.lead_time),
-        time=options.lead_time if options.lead else 0.0,
+        time=float(options.lead_time) if options.lead else 0.0,
         forward=1.0 if options.velocity_feedforward else 0.0,
-        feedback=options.torque_feedback,
+        feedback=float(options.torque_feedback),
     )
-    return tuple(map(float, gains)), tuple(map(float, lead))
+    return gains, lead
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

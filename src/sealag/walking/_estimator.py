@@ -1,5 +1,7 @@
 """State estimation of the walking controller: body terms, leg odometry, prediction."""
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from sealag.actuation import Actuators
@@ -9,7 +11,10 @@ from sealag.walking._feet import Side
 from sealag.walking._options import Prediction
 from sealag.walking._step import StepReferences
 
-_RING = 512
+if TYPE_CHECKING:
+    from sealag.kernels.walking_law import Biped, Gains, Lead
+
+_RING = 512  # commands in flight at most
 
 
 class Body:
@@ -23,8 +28,6 @@ class Body:
         q: Configuration (nq,).
         v: Velocity (nv,).
         terms: Its rigid-body terms, live.
-        raw_tree: The robot, as kernels take it.
-        raw_feet: Its terms and how the feet are fixed, likewise.
         angular: Angular momentum about the centre of mass (3,), live.
     """
 
@@ -32,16 +35,11 @@ class Body:
         self._workspace, self._feet = robot.workspace(), feet
         at = self._workspace
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
-        self.terms, self.raw_tree, self.angular = at.terms, tuple(robot.tree), at.momentum[3:]
-        self.raw_feet = tuple(at.terms), tuple(robot.frame_mounts(feet))
+        self.terms, self.angular = at.terms, at.momentum[3:]
 
     def update(self) -> None:
         """Evaluate the terms at ``q`` and ``v``."""
         self._workspace.update(self.q, self.v)
-
-    def gravity(self) -> Array:
-        """Return the gravity torque (nv,)."""
-        return self._workspace.gravity()
 
     def feet(self) -> Array:
         """Return the positions of both feet (2, 3), m."""
@@ -56,36 +54,61 @@ class Body:
         return self._workspace.frame_velocity(self._feet[foot])[:3]
 
 
+def biped_of(
+    robot: Robot, actuators: Actuators, body: Body, feet: tuple[str, str], *, period: float,
+    gains: "Gains", lead: "Lead",
+) -> "Biped":  # fmt: skip
+    """Return the robot as the walking kernels know it.
+
+    Args:
+        robot: The robot.
+        actuators: Springs and motors as the controller believes them to be.
+        body: Where it is; its arrays are shared.
+        feet: Frames of the left and the right foot.
+        period: Of the controller, s.
+        gains: Of the law.
+        lead: By which means springs and motors carry the task torque.
+    """
+    from sealag.kernels import dynamics, walking_law
+
+    n, nv = robot.n, robot.nv
+    stiffness, damping = actuators.spring_stiffness, actuators.motor_damping
+    springs = walking_law.Springs(
+        stiffness=np.array(stiffness), damping=np.array(damping), lag=damping / stiffness,
+        limit=np.where(np.isfinite(robot.effort_limit), robot.effort_limit, 1e3),
+        table=motor_table(actuators, period),
+    )  # fmt: skip
+    return walking_law.Biped(
+        tree=robot.tree, terms=body.terms, mounts=robot.frame_mounts(feet),
+        feet=dynamics.allocate_frames(2, nv), springs=springs,
+        flight=walking_law.Flight(np.full(_RING, -np.inf), np.zeros((_RING, n))),
+        gains=gains, lead=lead, q=body.q, v=body.v, motor=np.zeros((n, 2)),
+        anchor=np.zeros((2, 3)), tau_sea=np.zeros(n), tau=np.zeros(n), rates=np.zeros(n),
+        smooth=np.zeros(n), scratch=walking_law.allocate_scratch(nv, n),
+    )  # fmt: skip
+
+
 class Estimator:
     """Estimates the state from a measurement, and predicts it to when the next command acts.
 
     The base's position and velocity follow from the foot stood on, the joint encoders and the IMU.
 
     Args:
-        robot: The robot.
-        actuators: Springs and motors as the controller believes them to be.
+        biped: The robot as kernels know it; q, v, motor and spring torques are moved.
+        kept: The same as kernels take it.
         period: Of the controller, s.
         prediction: By which means.
         odometry: Whether the measured place and velocity of the base are replaced.
     """
 
     def __init__(
-        self, robot: Robot, actuators: Actuators, *, period: float, prediction: Prediction,
-        odometry: bool,
-    ) -> None:  # fmt: skip
-        from sealag.kernels import walking_state
+        self, biped: "Biped", kept: Any, *, period: float, prediction: Prediction, odometry: bool
+    ) -> None:
+        from sealag.kernels.walking_state import Timing, foresee
 
-        self._kernel = walking_state
+        self._timing, self._foresee, self._biped, self._kept = Timing, foresee, biped, kept
         self._period, self._prediction, self._odometry = period, prediction, odometry
-        self._springs = walking_state.Springs(
-            stiffness=np.ascontiguousarray(actuators.spring_stiffness),
-            table=motor_table(actuators, period),
-        )
-        self._motor = np.zeros((robot.n, 2))
-        self._anchor, self._stance = np.zeros((2, 3)), 0
-        self._ring = np.full(_RING, -np.inf), np.zeros((_RING, robot.n))
-        self._newest, self._any = 0, False
-        self.tau_sea = np.zeros(robot.n)
+        self._stance, self._newest, self._any = 0, 0, False
 
     def reset(self, feet: Array, stance: int) -> None:
         """Begin with both feet at known positions, and no command in flight.
@@ -94,8 +117,8 @@ class Estimator:
             feet: Their positions (2, 3), m.
             stance: Foot stood on.
         """
-        self._anchor[:], self._stance = feet, stance
-        self._ring[0][:], self._newest, self._any = -np.inf, 0, False
+        self._biped.anchor[:], self._stance = feet, stance
+        self._biped.flight.arrival[:], self._newest, self._any = -np.inf, 0, False
 
     def sent(self, command: Array, arrival: float) -> None:
         """Add a command to those in flight.
@@ -104,11 +127,11 @@ class Estimator:
             command: (n,) Nm.
             arrival: When it will reach the motors, s.
         """
+        flight = self._biped.flight
         self._newest = (self._newest + 1) % _RING
-        arrivals, commands = self._ring
-        commands[self._newest], arrivals[self._newest] = command, arrival
+        flight.command[self._newest], flight.arrival[self._newest] = command, arrival
         if not self._any:
-            commands[:], self._any = command, True
+            flight.command[:], self._any = command, True
 
     def move(
         self, body: Body, step: StepReferences, *, theta: Array, theta_dot: Array,
@@ -131,29 +154,24 @@ class Estimator:
             ticks = 0
         if self._odometry:
             self._step_over(body, step, measured)
-        self._motor[:, 0], self._motor[:, 1] = theta, theta_dot
-        kernel, (arrival, command) = self._kernel, self._ring
-        support = kernel.Support(
-            stance=step.stance, foot=self._stance if self._odometry else -1, anchor=self._anchor
-        )
-        timing = kernel.Timing(
+        motor = self._biped.motor
+        motor[:, 0], motor[:, 1] = theta, theta_dot
+        timing = self._timing(
             measured=measured, period=self._period, ticks=ticks, touchdown=step.begin,
-            lift_off=step.begin + step.transfer_time,
+            lift_off=step.begin + step.transfer_time, stance=step.stance,
+            foot=self._stance if self._odometry else -1, newest=self._newest,
         )  # fmt: skip
-        flight = kernel.Flight(arrival=arrival, command=command, newest=self._newest)
-        kernel.foresee(
-            (body.raw_tree, *body.raw_feet), tuple(support), tuple(self._springs), tuple(timing),
-            tuple(flight), body.q, body.v, self._motor, self.tau_sea,
-        )  # fmt: skip
+        self._foresee(self._kept, tuple(timing))
 
     def _step_over(self, body: Body, step: StepReferences, t: float) -> None:
         """Anchor the odometry at the new foot once it carries half of the weight."""
         old, new = self._stance, step.stance
         if new != old and step.phase(t) >= 0.5 * step.transfer_time:
             body.update()
-            self._anchor[new] = self._anchor[old] + body.foot(new) - body.foot(old)
-            x, y, _ = self._anchor[new].tolist()
-            self._anchor[new, 2], self._stance = step.foot_height(x, y), new
+            anchor = self._biped.anchor
+            anchor[new] = anchor[old] + body.foot(new) - body.foot(old)
+            x, y, _ = anchor[new].tolist()
+            anchor[new, 2], self._stance = step.foot_height(x, y), new
 
 
 def motor_table(actuators: Actuators, period: float) -> Array:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sealag.errors import ContractionError, RobotError
+from sealag.kernels import keep
 from sealag.robot import Contact, Robot
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body._law import Law
@@ -20,7 +21,7 @@ from sealag.whole_body._tasks import (
 )
 
 if TYPE_CHECKING:
-    from sealag.kernels.control_law import Gains, Signal, Tasks
+    from sealag.kernels.control_law import Control, Gains, Tasks
 
 SETTLED = 1e-12
 """rad: a smaller Newton step of q̄(θ) is the last. Ten times larger shows in differences of the
@@ -88,23 +89,24 @@ class LawEvaluation:
             fed_back=law.gravity is GravityCompensation.FEEDBACK,
         )
         self.planned_gravity, self._measured = gains.planned_gravity, self.running()
-        self._raw = self._allocate(frames, tasks, gains)
+        self._kept = keep(self._allocate(frames, tasks, gains))
         self.follow(np.asarray(posture, dtype=float))
         if law.gravity is GravityCompensation.PLANNED:
             self.planned_gravity[:] = self.space.gravity
 
-    def _allocate(self, frames: list[str], tasks: "Tasks", gains: "Gains") -> tuple[Any, ...]:
-        """Allocate memory for all that is evaluated; return the law as kernels take it."""
+    def _allocate(self, frames: list[str], tasks: "Tasks", gains: "Gains") -> "Control":
+        """Return the law with memory for all that is evaluated."""
         from sealag.kernels import dynamics, operational_space
 
         robot, kernel = self.robot, self._kernel
         nv, n, c, m = robot.nv, robot.n, len(tasks.contact_row), len(tasks.row)
-        memory = np.zeros(operational_space.memory_size(nv, n, c, m))
-        self.space = operational_space.divide(memory, nv, n, c, m)
+        self.space = operational_space.allocate(nv, n, c, m=m)
         self._terms = dynamics.allocate(robot.tree)
         self._at = kernel.Evaluation(
             along=np.zeros((nv, n)), offset=np.zeros(m), shift=np.zeros(nv), q=np.zeros(robot.nq),
             J_s=np.zeros((c, nv)), J_t=np.zeros((m, nv)), error=np.zeros(m), wanted=np.zeros(m),
+            joints=np.zeros(n), twist=np.zeros(6), target=np.zeros(m), moved=np.zeros(m),
+            pull=np.zeros(m),
         )  # fmt: skip
         self.error, self.offset, self.wanted = self._at.error, self._at.offset, self._at.wanted
         newton = kernel.Newton(
@@ -112,11 +114,11 @@ class LawEvaluation:
             J=np.zeros((m, n)), square=np.zeros((n, n)), step=np.zeros(n),
         )  # fmt: skip
         self._newton, self._levels, self._unused = newton, tasks.levels, np.zeros(n)
-        parts = (
-            robot.tree, robot.frame_mounts(frames), tasks, gains, self._terms,
-            dynamics.allocate_frames(len(frames), nv), self._at, newton,
+        return kernel.Control(
+            tree=robot.tree, mounts=robot.frame_mounts(frames), tasks=tasks, gains=gains,
+            terms=self._terms, frames=dynamics.allocate_frames(len(frames), nv), at=self._at,
+            newton=newton, space=self.space,
         )  # fmt: skip
-        return (*map(tuple, parts), memory)
 
     @property
     def rows(self) -> int:
@@ -153,11 +155,11 @@ class LawEvaluation:
         """
         self.tick(self._measured, 0.0, q, joints, out)
 
-    def tick(self, signal: "Signal", period: float, q: Array, angles: Array, out: Array) -> None:
+    def tick(self, signal: Any, period: float, q: Array, angles: Array, out: Array) -> None:
         """Evaluate at a running signal, which moves.
 
         Args:
-            signal: the signal.
+            signal: from `running`.
             period: since the last tick, s.
             q: (nq,) measured configuration.
             angles: (n,) joint angles of a measured signal, motor angles of another one, rad.
@@ -167,7 +169,7 @@ class LawEvaluation:
             ContractionError: q̄(θ) does not exist, or is not found.
             RobotError: the mass matrix is not positive definite.
         """
-        status = self._kernel.tick(self._raw, tuple(signal), period, q, angles, out)
+        status = self._kernel.tick(self._kept, signal, period, q, angles, out)
         if status == self._kernel.SINGULAR_MASS:
             raise RobotError(f"The mass matrix of {self.robot.name} is not positive definite.")
         if status == self._kernel.NO_STATIC_STATE:
@@ -175,8 +177,8 @@ class LawEvaluation:
 
     def running(
         self, *, sag: Array | None = None, iterations: int = 1, tank: EnergyTank | None = None
-    ) -> "Signal":
-        """Return a running signal: angles as measured, q̄(θ) from a sag (n,) on, or x̂ of a tank.
+    ) -> Any:
+        """Return a running signal as kernels take it: measured angles, q̄(θ) or x̂ of a tank.
 
         Args:
             sag: (n,) q̄ − θ, a first guess that is moved, rad; None for measured angles.
@@ -192,12 +194,13 @@ class LawEvaluation:
         else:
             kind = kernel.TANK
         position, theta, energy, started = tank.memory
-        return kernel.Signal(
+        signal = kernel.Signal(
             kind=kind, sag=np.zeros(n) if sag is None else sag, iterations=iterations,
             settled=SETTLED, diverged=DIVERGED, position=position, theta=theta, energy=energy,
-            started=started, rate=tank.rate, delay_bound=tank.delay_bound,
+            started=started, rate=float(tank.rate), delay_bound=float(tank.delay_bound),
             corrected=tank.flow is TankFlow.CORRECTED,
         )  # fmt: skip
+        return keep(signal)
 
     def settled(self, evaluate: Callable[[], None], away: Callable[[], Array]) -> None:
         """Evaluate again until overline(UN_s) is that of the configuration evaluated.

@@ -9,6 +9,7 @@ import numpy as np
 
 from sealag.actuation import Actuators
 from sealag.errors import RobotError
+from sealag.kernels import keep
 from sealag.robot import Contact, Motion, Robot
 from sealag.typing import Array, BoolArray
 from sealag.whole_body._law import Law
@@ -178,17 +179,18 @@ def _spaces_at(robot: Robot, law: Law, q: Array, *, contacts: Sequence[Contact])
 def _solved(
     robot: Robot, stack: Stack, *, gain: Array, levels: list[int], form: int, star: bool
 ) -> _SpacesAt:
-    from sealag.kernels.operational_space import StackedSpaces, StackedTerms, operational_spaces
+    from sealag.kernels import operational_space as kernel
 
     count, _, nv = stack.J_s.shape
     m, n = stack.J_t.shape[1], robot.n
     shapes = ((m, n), (m, m), (m, m), (nv, n), (n,), (m, nv))
-    out = StackedSpaces(*(np.zeros((count, *shape)) for shape in shapes))
-    terms = StackedTerms(M=stack.M, g=stack.g, J_s=stack.J_s, J_t=stack.J_t)
-    bad = operational_spaces(
-        tuple(terms), gain, np.array(levels), form, star, RANK_TOLERANCE, tuple(out)
-    )
-    if bad >= 0:
+    out = kernel.StackedSpaces(*(np.zeros((count, *shape)) for shape in shapes))
+    spaces = kernel.Stack(
+        terms=kernel.StackedTerms(M=stack.M, g=stack.g, J_s=stack.J_s, J_t=stack.J_t), K_x=gain,
+        levels=np.array(levels), form=form, star=star, tolerance=RANK_TOLERANCE, out=out,
+        space=kernel.allocate(nv, n, stack.J_s.shape[1], m=m),
+    )  # fmt: skip
+    if kernel.operational_spaces(keep(spaces)) >= 0:
         raise RobotError(
             f"The mass matrix of {robot.name} is not positive definite; "
             "a link that moves has no mass or no inertia."
