@@ -82,6 +82,9 @@ allocating = njit(_nrt=True, **_INLINED)
 inner = njit(_nrt=False, **_INLINED)
 """Called by kernels only; reads and writes arrays that it is given."""
 
+summing = njit(_nrt=False, fastmath={"reassoc", "contract"}, **_INLINED)
+"""An inner kernel whose sums may be regrouped, so that the processor adds several terms at once."""
+
 
 @structref.register
 class _KeptType(types.StructRef):

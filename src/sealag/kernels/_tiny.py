@@ -106,7 +106,7 @@ def _tick() -> None:
     )  # fmt: skip
     newton = control_law.Newton(
         H=np.zeros((nv, nv)), moved=np.zeros((nv, 1)), slope=square, J=square.copy(),
-        square=square.copy(), step=one.copy(),
+        force=square.copy(), square=square.copy(), step=one.copy(),
     )  # fmt: skip
     control = control_law.Control(
         tree=tree, mounts=_mounts(1, nv), tasks=tasks, gains=gains, terms=dynamics.allocate(tree),

@@ -79,6 +79,7 @@ class Newton(NamedTuple):
     moved: Array  # (nv, n) H along the contact-consistent motions
     slope: Array  # (n, n) ∂ḡ/∂q_j; 0 unless it is fed back
     J: Array  # (m, n) minus the errors' Jacobian
+    force: Array  # (m, n) S J
     square: Array  # (n, n)
     step: Array  # (n,)
 
@@ -274,7 +275,7 @@ def static_step(J_star, stiffness, springs, torque, sag, newton):
         springs: (n,) K, Nm/rad.
         torque: (n,) l at θ + sag.
         sag: (n,), moved.
-        newton: slope and J are read; square and step (n,) δ are written.
+        newton: slope and J are read; force, square and step (n,) δ are written.
 
     Returns:
         False if a pivot is not positive: the task is stiffer than the springs.
@@ -282,14 +283,11 @@ def static_step(J_star, stiffness, springs, torque, sag, newton):
     m, n = J_star.shape
     square, step = newton.square, newton.step
     copy(newton.slope, square)
+    multiply(stiffness, newton.J, newton.force)
     for r in range(m):
-        for s in range(m):
-            entry = stiffness[r, s]
-            if entry != 0.0:
-                for i in range(n):
-                    factor = entry * J_star[r, i]
-                    for j in range(n):
-                        square[i, j] -= factor * newton.J[s, j]
+        for i in range(n):
+            for j in range(n):
+                square[i, j] -= J_star[r, i] * newton.force[r, j]
     for i in range(n):
         square[i, i] += springs[i]
         step[i] = -springs[i] * sag[i] - torque[i]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sealag.kernels._jit import inner
+from sealag.kernels._jit import inner, summing
 
 _ROUNDING = 1e-13
 """Of the trace: what a Cholesky factorisation leaves. Ten times smaller takes rounding for rank;
@@ -49,7 +49,7 @@ def multiply(A, B, out):
                     out[i, j] += a * B[p, j]
 
 
-@inner
+@summing
 def multiply_transposed(A, B, out):
     """out = A Bᵀ for A (m, k), B (n, k), out (m, n)."""
     m, k = A.shape
@@ -237,13 +237,13 @@ def invert_low_rank(A, threshold, out, scratch, values):
     """out = A⁺ of a symmetric positive semidefinite A (n, n), if that is safe without eigenvalues.
 
     A = L Lᵀ by Cholesky with pivots, L (n, r), and A⁺ = L G⁻² Lᵀ with G = Lᵀ L, whose eigenvalues
-    are those of A that are not 0.
+    are those of A that are not 0; A⁻¹ at full rank.
 
     Args:
         A: (n, n), kept.
         threshold: eigenvalues up to this count as zero.
         out: (n, n), written.
-        scratch: (5, n²).
+        scratch: (5, ≥ n²).
         values: (≥ n,) scratch.
 
     Returns:
@@ -252,16 +252,18 @@ def invert_low_rank(A, threshold, out, scratch, values):
         trace is rounding, and λ_r ≥ 1 / trace G⁻¹ is above the threshold.
     """
     n = A.shape[0]
-    r, whole = _factor(A, scratch[0].reshape(n, n), values)
+    r, whole = _factor(A, scratch[0][: n * n].reshape(n, n), values)
+    least = max(threshold, whole / _WORST_CONDITION)
+    if r == n:
+        if invert_spd(A, out, scratch[1][: n * n].reshape(n, n)) and trace(out) * least < 1.0:
+            return n
+        return -1
     L, W = scratch[0][: r * n].reshape(r, n), scratch[1][: r * n].reshape(r, n)
     G, G_inverse = scratch[2][: r * r].reshape(r, r), scratch[3][: r * r].reshape(r, r)
     multiply_transposed(L, L, G)
     if not invert_spd(G, G_inverse, scratch[4][: r * r].reshape(r, r)):
         return -1
-    weakest = 0.0
-    for i in range(r):
-        weakest += G_inverse[i, i]
-    if weakest * max(threshold, whole / _WORST_CONDITION) >= 1.0:
+    if trace(G_inverse) * least >= 1.0:
         return -1
     multiply(G_inverse, L, W)
     out[:, :] = 0.0
@@ -277,7 +279,8 @@ def invert_low_rank(A, threshold, out, scratch, values):
 def pseudo_inverse(A, threshold, out, scratch, values):
     """out = A⁺; eigenvalues only where `invert_low_rank` gives no answer. A is overwritten."""
     if invert_low_rank(A, threshold, out, scratch, values) < 0:
-        root, vectors = scratch[0].reshape(A.shape), scratch[1].reshape(A.shape)
+        n = A.shape[0]
+        root, vectors = scratch[0][: n * n].reshape(n, n), scratch[1][: n * n].reshape(n, n)
         pseudo_inverse_psd(A, threshold, out, root, values, vectors)
 
 

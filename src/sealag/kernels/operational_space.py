@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.kernels._jit import entry, inner
+from sealag.kernels._jit import entry, inner, summing
 from sealag.kernels.linalg import (
     copy,
     invert_spd,
@@ -41,6 +41,7 @@ class Space(NamedTuple):
     contact_inertia: Array  # (c, c) its pseudo-inverse
     scratch_c: Array  # (5, c²)
     square_m: Array  # (5, m²) scratch
+    scratch_m: Array  # (5, m²)
     moved_c: Array  # (c, nv) J_s M⁻¹
     wide_c: Array  # (c, nv) scratch
     wide_m: Array  # (m, nv)
@@ -97,23 +98,26 @@ def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
         M_inverse=np.zeros((nv, nv)), P=np.zeros((nv, nv)), phi=np.zeros((n, n)),
         phi_inverse=np.zeros((n, n)), phi_copy=np.zeros((n, n)), scratch_n=np.zeros((5, n * n)),
         contact_mobility=np.zeros((c, c)), contact_inertia=np.zeros((c, c)),
-        scratch_c=np.zeros((5, c * c)), square_m=np.zeros((5, m * m)), moved_c=np.zeros((c, nv)),
+        scratch_c=np.zeros((5, c * c)), square_m=np.zeros((5, m * m)),
+        scratch_m=np.zeros((5, m * m)),        moved_c=np.zeros((c, nv)),
         wide_c=np.zeros((c, nv)), wide_m=np.zeros((m, nv)), low_m=np.zeros((m, n)),
         tall_n=np.zeros((nv, n)), values=np.zeros(max(n, c, m, 1)),
     )  # fmt: skip
 
 
 @inner
-def _subtract_projection(P, X, inverse, scratch):
-    """P ← P − Xᵀ A⁺ X with X (k, nv), A⁺ (k, k) and scratch (k, nv)."""
-    multiply(inverse, X, scratch)
+def _subtract_projection(P, X, lift):
+    """P ← P − Xᵀ A⁺ X, symmetric, with X (k, nv) and lift = A⁺ X (k, nv)."""
     k, nv = X.shape
     for r in range(k):
         for i in range(nv):
             x = X[r, i]
             if x != 0.0:
-                for j in range(nv):
-                    P[i, j] -= x * scratch[r, j]
+                for j in range(i + 1):
+                    P[i, j] -= x * lift[r, j]
+    for i in range(nv):
+        for j in range(i):
+            P[j, i] = P[i, j]
 
 
 @inner
@@ -131,20 +135,40 @@ def _constrain(M, J_s, tolerance, space):
     multiply_transposed(X, J_s, A)
     threshold = tolerance * trace(A)
     pseudo_inverse(A, threshold, A_inverse, space.scratch_c, space.values)
-    _subtract_projection(P, X, A_inverse, scratch)
+    multiply(A_inverse, X, scratch)
+    _subtract_projection(P, X, scratch)
     return True
 
 
 @inner
+def _is_scalar(K):
+    """Whether K (k, k) is a multiple of the identity, exactly."""
+    for i in range(K.shape[0]):
+        for j in range(K.shape[1]):
+            if K[i, j] != (K[0, 0] if i == j else 0.0):
+                return False
+    return True
+
+
+@inner
+def _inertia(H, threshold, needs_root, Lambda, root, scratch, space):
+    """Λ = H⁺ of one level, and its root Λ^½ if that is needed; H is overwritten."""
+    if needs_root:
+        pseudo_inverse_psd(H, threshold, Lambda, root, space.values, scratch)
+    else:
+        pseudo_inverse(H, threshold, Lambda, space.scratch_m, space.values)
+
+
+@inner
 def _stiffness_block(form, K, Lambda, root, scratch, out):
-    """The task stiffness of one level: Λ^½ K Λ^½, Λ K, or K."""
-    if form == SYMMETRIC:
+    """The task stiffness of one level: Λ^½ K Λ^½, which is Λ K for a scalar K; Λ K; or K."""
+    if form == SYMMETRIC and not _is_scalar(K):
         multiply(K, root, scratch)
         multiply(root, scratch, out)
-    elif form == PUBLISHED:
-        multiply(Lambda, K, out)
-    else:
+    elif form == FORCE:
         copy(K, out)
+    else:
+        multiply(Lambda, K, out)
 
 
 @inner
@@ -200,7 +224,7 @@ def operational_space(M, g, J_s, J_t, K_x, levels, form, star, tolerance, space)
     return True
 
 
-@inner
+@summing
 def _mobility(J, M_inverse):
     """trace(J M⁻¹ Jᵀ): the scale against which a lost direction is small."""
     total = 0.0
@@ -221,7 +245,7 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
     P, phi_inverse = space.P, space.phi_inverse
     nv, n = space.joint_from_base.shape
     base = nv - n
-    X, scratch = space.wide_m[:size], space.lift[first:last]
+    X, lift = space.wide_m[:size], space.lift[first:last]
     multiply(J_t[first:last], P, X)
     H = space.square_m[0][: size * size].reshape(size, size)
     Lambda = space.square_m[1][: size * size].reshape(size, size)
@@ -230,20 +254,23 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
     block = space.square_m[4][: size * size].reshape(size, size)
     multiply_transposed(X, J_t[first:last], H)
     threshold = tolerance * _mobility(J_t[first:last], space.M_inverse)
-    pseudo_inverse_psd(H, threshold, Lambda, root, space.values, vectors)
+    K = K_x[first:last, first:last]
+    needs_root = form == SYMMETRIC and not _is_scalar(K)
+    _inertia(H, threshold, needs_root, Lambda, root, vectors, space)
     for r in range(size):
         for j in range(n):
             total = 0.0
             for p in range(n):
                 total += X[r, base + p] * phi_inverse[p, j]
             space.J_star[first + r, j] = total
-    _subtract_projection(P, X, Lambda, scratch)
+    multiply(Lambda, X, lift)
+    if last < space.lift.shape[0]:
+        _subtract_projection(P, X, lift)
     if star:
         J_phi = space.low_m[:size]
         multiply(space.J_star[first:last], space.phi, J_phi)
         multiply_transposed(J_phi, space.J_star[first:last], H)
-        pseudo_inverse_psd(H, threshold, Lambda, root, space.values, vectors)
-    K = K_x[first:last, first:last]
+        _inertia(H, threshold, needs_root, Lambda, root, vectors, space)
     for i in range(size):
         for j in range(size):
             vectors[i, j] = K[i, j]

@@ -98,8 +98,7 @@ def allocate_physics(plant: Plant, *, instant: bool) -> Physics:
     work, n, points = allocate_work(plant), len(plant.motors.stiffness), len(plant.contacts.closed)
     nv, total = len(work.terms.nle), len(plant.contacts.frame)
     now, following = (
-        allocate_instant(nv + plant.tree.extra, nv, n, points=points, total=total)
-        for _ in range(2)
+        allocate_instant(nv + plant.tree.extra, nv, n, points=points, total=total) for _ in range(2)
     )
     memory = Memory(
         rates=np.zeros((4, nv)), accelerations=np.zeros((4, nv)), powers=np.zeros((4, 4)),

@@ -168,9 +168,7 @@ def _slide(physics, step):
     """Try a step in which no contact changes; False, with all as it was, if one does."""
     contacts, following, before = physics.plant.contacts, physics.following, physics.memory.yielding
     copy(contacts.yielding, before)
-    if take_step(physics, step) and np.isfinite(
-        following.energy[KINETIC]
-    ):
+    if take_step(physics, step) and np.isfinite(following.energy[KINETIC]):
         measure_gaps(contacts, following)
         smallest, _ = smallest_margin(
             contacts.C, contacts.closed, contacts.weight, following.force, following.gap,

@@ -111,7 +111,8 @@ class LawEvaluation:
         self.error, self.offset, self.wanted = self._at.error, self._at.offset, self._at.wanted
         newton = kernel.Newton(
             H=np.zeros((nv, nv)), moved=np.zeros((nv, n)), slope=np.zeros((n, n)),
-            J=np.zeros((m, n)), square=np.zeros((n, n)), step=np.zeros(n),
+            J=np.zeros((m, n)), force=np.zeros((m, n)), square=np.zeros((n, n)),
+            step=np.zeros(n),
         )  # fmt: skip
         self._newton, self._levels, self._unused = newton, tasks.levels, np.zeros(n)
         return kernel.Control(
