@@ -1,9 +1,9 @@
 """Compiled kernels: `@njit` functions over arrays, nothing else.
 
 What a kernel needs at every call is a NamedTuple that is handed over once, by `keep`: to pass a
-hundred arrays at every call costs more than a simulation step. Each kernel has a slow twin in plain NumPy under
-``tests/reference``. Importing this package compiles nothing; ``python -m sealag.kernels`` compiles
-and caches every kernel.
+hundred arrays at every call costs more than a simulation step. Each kernel has a slow twin in plain
+NumPy under ``tests/reference``. Importing this package compiles nothing; ``python -m
+sealag.kernels`` compiles and caches every kernel.
 """
 
 import importlib

@@ -2,8 +2,8 @@
 
 An `entry` is called from Python and cached with all that it calls. An `inner` kernel exists only
 inside entries: it is inlined there, and neither optimised nor translated on its own, which would
-take most of the compilation. It counts no references, for that costs more than its arithmetic. So
-it can neither allocate nor return arrays to a kernel that counts; `allocating` ones do that.
+take most of the compilation. It counts no references, for that costs more than its arithmetic, and
+so it can neither allocate nor return new arrays: memory comes from Python, see `keep`.
 """
 
 from typing import Any
@@ -68,21 +68,20 @@ class _Inlined(CompilerBase):
         return [passes]
 
 
-_INLINED: dict[str, Any] = {
-    "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True,
-    "pipeline_class": _Inlined,
+_INNER: dict[str, Any] = {
+    "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _Inlined, "_nrt": False,
 }  # fmt: skip
 
 entry = njit(cache=True, no_cfunc_wrapper=True, _nrt=True)
 """Called from Python, and kept on disk with all that it calls."""
 
-allocating = njit(_nrt=True, **_INLINED)
-"""Called by kernels only; returns arrays."""
-
-inner = njit(_nrt=False, **_INLINED)
+inner = njit(forceinline=True, **_INNER)
 """Called by kernels only; reads and writes arrays that it is given."""
 
-summing = njit(_nrt=False, fastmath={"reassoc", "contract"}, **_INLINED)
+shared = njit(**_INNER)
+"""A large inner kernel that several places call: one copy, instead of one at each place."""
+
+summing = njit(forceinline=True, fastmath={"reassoc", "contract"}, **_INNER)
 """An inner kernel whose sums may be regrouped, so that the processor adds several terms at once."""
 
 

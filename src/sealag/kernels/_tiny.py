@@ -145,33 +145,11 @@ def _step() -> None:
         np.eye(3)[None], parts.contacts.closed, 1.0, three, np.zeros(1), three.copy()
     )
     plant.sense(kept, 0.0, np.zeros(1 + _NQ + _NV + 3 + 2))
-    plant.act(kept, plant.STEP, 1e-3, parts.contacts.closed, three)
     motor.rate_rows(tuple(parts.motors), True, np.zeros((6, 1)), np.zeros((6, 1)))
-    _glide(kept, physics.now)
-
-
-def _glide(kept: Any, now: contact.Instant) -> None:
-    one, none = np.zeros(1), np.zeros(0, np.int64)
-    channels = run.Channels(
-        due=np.zeros(0), kind=none, tick=none, samples=np.zeros((1, 20)), commands=np.zeros((1, 1)),
-        sent=one, acting_tick=np.zeros(1, np.int64), torque_known=np.zeros(0),
-        torque_history=np.zeros((1, 1)), storage=one, tank=one, undelayed_work=one,
-    )  # fmt: skip
-    periods = run.Periods(step=1e-3, steps=0, log=1, watch=1, torque=1, torque_period=1e-3)
-    limits = run.Limits(deflection=1.0, speed=1.0, height=-1.0, tilt=-1.0, up=np.zeros((1, 3)))
-    shapes = {
-        "q": now.q.shape, "v": now.v.shape, "contact_force": (1, 3), "stores": (4,),
-        "joint": (9, 1), "scalar": (5,), "time": (), "tick": (), "moved": (), "storage": (),
-        "tank": (),
-    }  # fmt: skip
-    log = run.Log(
-        **{
-            name: np.zeros((1, *shapes.get(name, (1,))), np.int64 if name in run.WHOLE else float)
-            for name in run.Log._fields
-        }
+    start = (0.0, 0, 0, run.WATCH)
+    run.act_or_glide(
+        kept, keep(run.idle(1)), plant.STORE, 1e-3, parts.contacts.closed, three, start, 1.0
     )
-    course = keep(run.Course(channels, periods, limits, log))
-    run.glide(kept, course, (0.0, 0, 0, run.WATCH), 1.0)
 
 
 def _different(kind: Any) -> Any:

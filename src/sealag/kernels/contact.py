@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.kernels import friction
-from sealag.kernels._jit import entry, inner
+from sealag.kernels._jit import entry, inner, shared
 from sealag.kernels.dynamics import (
     Frames,
     Mounts,
@@ -232,7 +232,7 @@ def _write_powers(contacts, at, work):
     copy(work.terms.energy, at.energy)
 
 
-@inner
+@shared
 def _prepare(plant, at, work):
     """Write what the contact forces of an instant follow from; False if M is singular."""
     rigid_body_terms(plant.tree, at.q, at.v, work.terms)
@@ -246,7 +246,7 @@ def _prepare(plant, at, work):
     return True
 
 
-@inner
+@shared
 def accelerate(plant, at, work):
     """Write spring torques, contact forces and acceleration at an instant, from its state.
 

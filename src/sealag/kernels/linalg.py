@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sealag.kernels._jit import inner, summing
+from sealag.kernels._jit import inner, shared, summing
 
 _ROUNDING = 1e-13
 """Of the trace: what a Cholesky factorisation leaves. Ten times smaller takes rounding for rank;
@@ -100,7 +100,7 @@ def backward_solve(L, x):
         x[i] = s / L[i, i]
 
 
-@inner
+@shared
 def invert_spd(A, out, factor):
     """out = A⁻¹ of a symmetric positive definite A (n, n) by Cholesky; False if it is not.
 
@@ -174,7 +174,7 @@ def _rotate(A, vectors, p, q):
         vectors[k, p], vectors[k, q] = c * a - s * b, s * a + c * b
 
 
-@inner
+@shared
 def pseudo_inverse_psd(A, threshold, out, root, values, vectors):
     """out = A⁺ and root = (A⁺)^½ of a symmetric positive semidefinite A (n, n); A is overwritten.
 
@@ -275,7 +275,7 @@ def invert_low_rank(A, threshold, out, scratch, values):
     return r
 
 
-@inner
+@shared
 def pseudo_inverse(A, threshold, out, scratch, values):
     """out = A⁺; eigenvalues only where `invert_low_rank` gives no answer. A is overwritten."""
     if invert_low_rank(A, threshold, out, scratch, values) < 0:
@@ -284,7 +284,7 @@ def pseudo_inverse(A, threshold, out, scratch, values):
         pseudo_inverse_psd(A, threshold, out, root, values, vectors)
 
 
-@inner
+@shared
 def least_squares(A, r, damping, x, scratch):
     """Write the least-squares solution x (m,) of A x = r, damped where A is nearly singular.
 

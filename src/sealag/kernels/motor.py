@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.kernels._jit import entry, inner
+from sealag.kernels._jit import entry, inner, shared
 from sealag.kernels.ledger import (
     COMMAND,
     COULOMB,
@@ -269,7 +269,7 @@ def _integrate(series, order, link, t, works):
     return Works(squared, port, shaft, slip, motor)
 
 
-@inner
+@shared
 def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     """Move rotor j along its link's cubic while its drive does one thing.
 

@@ -1,8 +1,7 @@
-"""Plant kernels: steps of links, motors and contacts, and what passes between two ticks.
+"""Plant kernels: steps of links, motors and contacts.
 
 Link side: fourth-order Runge-Kutta in exponential coordinates about the step's start. Motor side:
-exact along the link's cubic. `glide` does step after step, with samples, commands, torque feedback
-and the log, until something needs Python: a tick, another load, a change of contact.
+exact along the link's cubic.
 """
 
 from typing import NamedTuple
@@ -10,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.kernels import motor, spatial
-from sealag.kernels._jit import entry, inner
+from sealag.kernels._jit import entry, inner, shared
 from sealag.kernels.contact import (
     Instant,
     Plant,
@@ -147,7 +146,7 @@ def _close(plant, now, held, step, memory, following):
         following.tau_motor[j] = rotor.torque
 
 
-@inner
+@shared
 def take_step(physics, step):
     """Do a step in the present contact modes; return whether every instant has a solution."""
     plant, work, now, following = physics.plant, physics.work, physics.now, physics.following
@@ -160,22 +159,25 @@ def take_step(physics, step):
     copy(now.v, rates[0])
     copy(now.acceleration, accelerations[0])
     copy(now.power, powers[0])
-    for k in range(1, 4):
-        spatial.stage(
-            now.q, now.v, rates[k - 1], accelerations[k - 1], step if k == 3 else 0.5 * step, base,
-            memory.displacement, following.q, following.v, rates[k],
-        )  # fmt: skip
-        copy(memory.angle[k // 3], following.theta)
-        copy(memory.speed[k // 3], following.theta_dot)
+    for k in range(1, 5):
+        if k == 4:
+            _close(plant, now, held, step, memory, following)
+        else:
+            spatial.stage(
+                now.q, now.v, rates[k - 1], accelerations[k - 1], step if k == 3 else 0.5 * step,
+                base, memory.displacement, following.q, following.v, rates[k],
+            )  # fmt: skip
+            copy(memory.angle[k // 3], following.theta)
+            copy(memory.speed[k // 3], following.theta_dot)
         if not accelerate(plant, following, work):
             return False
-        copy(following.acceleration, accelerations[k])
-        copy(following.power, powers[k])
+        if k < 4:
+            copy(following.acceleration, accelerations[k])
+            copy(following.power, powers[k])
     for k in range(powers.shape[1]):
         mean = powers[0, k] + 2.0 * (powers[1, k] + powers[2, k]) + powers[3, k]
         memory.gained.scalar[k] = step / 6.0 * mean
-    _close(plant, now, held, step, memory, following)
-    return accelerate(plant, following, work)
+    return True
 
 
 @inner
@@ -231,12 +233,12 @@ def _copy(source, target):
     copy(source.energy, target.energy)
 
 
-@entry
-def act(kept, what, step, touching, impulse):
-    """Do one thing with a plant: all that Python asks of it shares one compilation.
+@inner
+def act(physics, what, step, touching, impulse):
+    """Do one thing with a plant.
 
     Args:
-        kept: `Physics`.
+        physics: the plant.
         what: EVALUATE the present instant's dynamics and contact forces; SETTLE which touching
             points are closed under its forces, or STRIKE them on the ground; try a STEP; or STORE
             the present energies in the books.
@@ -247,21 +249,16 @@ def act(kept, what, step, touching, impulse):
     Returns:
         How contacts have settled, as `friction.settle`, and what an impact took, J.
     """
-    return _act(kept.parts, what, step, touching, impulse)
-
-
-@inner
-def _act(physics, what, step, touching, impulse):
     plant, work, now = physics.plant, physics.work, physics.now
     if what in (SETTLE, STRIKE):
         return resolve(plant, now, work, touching, what == STRIKE, impulse)
+    solved = True
     if what == EVALUATE:
         solved = accelerate(plant, now, work)
     elif what == STEP:
         solved = take_step(physics, step)
     else:
         _update_stores(physics)
-        solved = True
     return SETTLED if solved else UNSOLVABLE, 0.0
 
 

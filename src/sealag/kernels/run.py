@@ -18,7 +18,7 @@ from sealag.kernels.contact import (
 )
 from sealag.kernels.dynamics import KINETIC
 from sealag.kernels.linalg import copy
-from sealag.kernels.plant import MARGIN, SAME, accept, take_step
+from sealag.kernels.plant import MARGIN, SAME, STORE, accept, act, take_step
 from sealag.typing import Array, IntArray
 
 LOAD, SAMPLE, TICK, TAKE = range(4)  # kinds of events, in their order at one instant
@@ -26,6 +26,7 @@ WATCH, EVENTS, CLOSE, MOVE, INSIDE = range(5)
 """What comes next in a run: at a step's beginning watch, let events happen, close the instant
 (torque feedback and log), move; inside a step only events."""
 END, FALLEN, EVENT, STATE, BLOCKED = range(5)  # why `glide` returns
+GLIDE = STORE + 1  # what `act_or_glide` does besides what `plant.act` does
 
 
 class Channels(NamedTuple):
@@ -81,6 +82,10 @@ class Log(NamedTuple):
 
 
 WHOLE = ("tick", "contact_mode")  # columns of the log that are whole numbers
+DIMENSIONS = {
+    **dict.fromkeys(("time", "tick", "moved", "storage", "tank"), 1), "contact_force": 3, "joint": 3
+}  # fmt: skip
+"""Of the log's arrays that do not have two."""
 
 
 class Limits(NamedTuple):
@@ -189,6 +194,22 @@ class Course(NamedTuple):
     log: Log
 
 
+def idle(n: int) -> Course:
+    """Return the course of a plant of n joints that is in no run."""
+    empty, log = np.zeros(0), {}
+    for name in Log._fields:
+        log[name] = np.zeros((0,) * DIMENSIONS.get(name, 2), np.int64 if name in WHOLE else float)
+    none, one = np.zeros(0, np.int64), np.zeros(1)
+    channels = Channels(
+        due=empty, kind=none, tick=none, samples=np.zeros((1, 1)), commands=np.zeros((1, n)),
+        sent=np.zeros(n), acting_tick=np.zeros(1, np.int64), torque_known=empty,
+        torque_history=np.zeros((1, n)), storage=one, tank=one.copy(), undelayed_work=np.zeros(n),
+    )  # fmt: skip
+    periods = Periods(step=1.0, steps=0, log=1, watch=1, torque=1, torque_period=1.0)
+    limits = Limits(deflection=1.0, speed=1.0, height=-1.0, tilt=-1.0, up=np.zeros((1, 3)))
+    return Course(channels, periods, limits, Log(**log))
+
+
 class Cursor(NamedTuple):
     """Where a run is."""
 
@@ -199,25 +220,43 @@ class Cursor(NamedTuple):
 
 
 @entry
-def glide(kept, course, cursor, said):
-    """Go on with a run until something needs Python.
+def act_or_glide(kept, course, what, step, touching, impulse, cursor, said):
+    """Do one thing with a plant, or go on with a run: both share one compilation.
 
     Args:
         kept: `Physics`.
-        course: kept `Course`.
-        cursor: raw `Cursor`.
+        course: kept `Course`; idle where there is no run.
+        what: GLIDE, or what `plant.act` does.
+        step: its length of a step, s.
+        touching: its points that may be closed (P,).
+        impulse: (P, 3) of its impact, Ns, written.
+        cursor: raw `Cursor` of the run.
+        said: instant at which the controller last stated its storage, s; inf if it states none.
+
+    Returns:
+        What `act` or `glide` return; the number is what an impact took, J, or the instant, s.
+    """
+    if what == GLIDE:
+        return glide(kept.parts, course.parts, Cursor(*cursor), said)
+    status, lost = act(kept.parts, what, step, touching, impulse)
+    return status, lost, Cursor(*cursor)
+
+
+@inner
+def glide(physics, course, at, said):
+    """Go on with a run until something needs Python.
+
+    Args:
+        physics: the plant.
+        course: the run.
+        at: `Cursor`.
         said: instant at which the controller last stated its storage, s; inf if it states none.
 
     Returns:
         END; FALLEN if `Limits` are left; EVENT if an event needs Python, whose part it is to count
         it; STATE if the controller must state its storage for the log; BLOCKED if a step needs
-        Python. The present instant, s. And the raw `Cursor`, that of BLOCKED behind the step.
+        Python. The present instant, s. And the `Cursor`, that of BLOCKED behind the step.
     """
-    return _glide(kept.parts, course.parts, Cursor(*cursor), said)
-
-
-@inner
-def _glide(physics, course, at, said):
     plant, now = physics.plant, physics.now
     channels, periods, limits, log = course.channels, course.periods, course.limits, course.log
     same = SAME * periods.step

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.constants import GRAVITY
-from sealag.kernels._jit import entry, inner
+from sealag.kernels._jit import entry, inner, shared
 from sealag.kernels.dynamics import Frames, Mounts, Terms, Tree, frame_terms
 from sealag.kernels.linalg import (
     cholesky,
@@ -145,7 +145,7 @@ def allocate_scratch(nv: int, n: int) -> Scratch:
     )  # fmt: skip
 
 
-@inner
+@shared
 def constrain(M_inverse, h, J, b, scratch):
     """Write a_0 and P of v̇ = a_0 + P τ under the contact rows J v̇ = −b.
 

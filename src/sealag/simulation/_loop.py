@@ -252,7 +252,7 @@ class _Loop:
         if not self._filled():
             still = self._course_of(self._periods._replace(steps=0))
             closing = (0.0, 0, len(self._channels.due), self._kernel.CLOSE)
-            self._kernel.glide(self.plant.physics, still, closing, math.inf)
+            self.plant.glide(still, closing, math.inf)
         return self._result(outcome, message)
 
     def _filled(self) -> int:
@@ -265,7 +265,7 @@ class _Loop:
         cursor, course = (0.0, 0, 0, kernel.WATCH), self._course
         shown, every = 0, max(1, round(0.1 / self.clock.physics))
         while True:
-            why, plant.time, cursor = kernel.glide(plant.physics, course, cursor, self._said)
+            why, plant.time, cursor = plant.glide(course, tuple(cursor), self._said)
             time, step, event, part = cursor
             if progress is not None and step > shown:  # what was there then is logged
                 progress(plant.time)

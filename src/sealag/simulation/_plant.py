@@ -9,7 +9,7 @@ kernels.contact), torque and velocity limits and Coulomb stick, which act from a
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,11 +26,13 @@ from sealag.walking import Ground, GroundProfile
 
 if TYPE_CHECKING:
     from sealag.kernels.contact import Instant
+    from sealag.kernels.run import Cursor
 
 FASTEST = 1e4  # rad/s, m/s: beyond any physical range
 _EVENTS_PER_STEP = 60
 _STABLE = 2.0  # swing of a link on its spring in a step, rad; Runge-Kutta is stable to 2.8
 _LOCATE = 40
+_NOWHERE = (0.0, 0, 0, 0)  # a raw cursor of no run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +84,7 @@ class Plant:
         delayed_torque_feedback: bool = False,
         stabilisation: float = 50.0,
     ) -> None:
-        from sealag.kernels import contact, friction, plant
+        from sealag.kernels import contact, friction, plant, run
 
         if not (np.isfinite(step) and step > 0):
             raise InputError(f"the step must be a time > 0 s, got {step}")
@@ -91,7 +93,7 @@ class Plant:
                 f"actuators are for joints {list(actuators.joints)}, "
                 f"the robot has {list(robot.joints)}"
             )
-        self._kernel, self._friction = plant, friction
+        self._kernel, self._friction, self._run = plant, friction, run
         self.robot, self.actuators, self.step_length = robot, actuators, step
         self.surroundings = Surroundings(
             robot, feet, ground or GroundProfile(), loaded_frames, stabilisation=stabilisation,
@@ -104,7 +106,7 @@ class Plant:
         physics = plant.allocate_physics(parts, instant=not delayed_torque_feedback)
         self.now, self._next, self.held = physics.now, physics.following, physics.held
         self.ledger, self._gained = physics.ledger, physics.memory.gained
-        self.physics = keep(physics)
+        self._physics, self._idle = keep(physics), keep(run.idle(robot.n))
         self.impulse = np.zeros((self.surroundings.count, 3))
         self.events: list[ContactEvent] = []
 
@@ -167,9 +169,24 @@ class Plant:
             t: The time that the measurement says, s.
             out: The row of a `Measurement` with one contact flag for each foot.
         """
-        self._kernel.sense(self.physics, t, out)
+        self._kernel.sense(self._physics, t, out)
 
     # Motion ------------------------------------------------------------------------------------
+    def glide(
+        self, course: Any, cursor: "tuple[float, int, int, int]", said: float
+    ) -> "tuple[int, float, Cursor]":
+        """Go on with a run until something needs Python, see `kernels.run.glide`.
+
+        Args:
+            course: The run, as kernels take it.
+            cursor: Where it is.
+            said: Instant at which the controller last stated its storage, s.
+        """
+        return self._run.act_or_glide(
+            self._physics, course, self._run.GLIDE, 0.0, self.contacts.closed, self.impulse,
+            cursor, said,
+        )  # fmt: skip
+
     def push(self, load: Array) -> None:
         """Let other forces act on the loaded frames from now on.
 
@@ -242,9 +259,12 @@ class Plant:
     def _act(
         self, what: int, *, step: float = 0.0, touching: IntArray | None = None
     ) -> tuple[int, float]:
-        """Do one thing, see the kernel."""
+        """Do one thing, see `kernels.plant.act`."""
         mask = self.contacts.closed if touching is None else touching
-        return self._kernel.act(self.physics, what, step, mask, self.impulse)
+        status, number, _ = self._run.act_or_glide(
+            self._physics, self._idle, what, step, mask, self.impulse, _NOWHERE, math.inf
+        )
+        return status, number
 
     def _evaluate(self) -> None:
         """Evaluate dynamics and contact forces of the present instant at its q, v and motors."""
