@@ -232,7 +232,7 @@ def _write_powers(contacts, at, work):
     copy(work.terms.energy, at.energy)
 
 
-@shared
+@inner
 def _prepare(plant, at, work):
     """Write what the contact forces of an instant follow from; False if M is singular."""
     rigid_body_terms(plant.tree, at.q, at.v, work.terms)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.kernels._jit import inner, shared
+from sealag.kernels._jit import inner
 from sealag.kernels.linalg import backward_solve, cholesky, copy, forward_solve
 from sealag.typing import Array, IntArray
 
@@ -193,7 +193,7 @@ def _twist(eq, force, closed, surfaces):
     return change
 
 
-@shared
+@inner
 def solve(eq, surfaces, closed, yielding, x, force):
     """Meet the contact conditions of the closed points.
 

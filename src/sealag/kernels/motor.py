@@ -247,6 +247,18 @@ def _expand(motors, j, instant, drive, rotor, link, t, order, series):
 
 
 @inner
+def _half(series, rotor, t, order):
+    """Return the rotor in the middle of a series over a time t that begins at a rotor."""
+    angle, speed, torque, share = rotor.angle, 0.0, 0.0, 1.0
+    for k in range(order + 1):
+        speed += share * series.speed[k]
+        torque += share * series.torque[k]
+        share *= 0.5
+        angle += share * t * series.speed[k] / (k + 1.0)
+    return Rotor(angle, speed, torque)
+
+
+@inner
 def _integrate(series, order, link, t, works):
     """Add the works of one piece of a motion by Gauss' rule."""
     values = series.values
@@ -352,6 +364,10 @@ def _reversal(motors, j, instant, drive, rotor, link, time, series):
 def predict(motors, j, held, rotor, link, step, series):
     """Return rotor j half a step and a step ahead along its link's motion."""
     drive, _, rotor = choose(motors, j, held, rotor, link)
+    reach = _fastest(motors, j, held.instant, drive.limited) * step
+    if reach <= _REACH:
+        whole = _expand(motors, j, held.instant, drive, rotor, link, step, _order(reach), series)
+        return _half(series, rotor, step, _order(reach)), whole
     half, _ = travel(motors, j, held.instant, drive, rotor, link, 0.5 * step, series, False)
     link = link_at(link, 0.5 * step)
     whole, _ = travel(motors, j, held.instant, drive, half, link, 0.5 * step, series, False)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.kernels import motor, spatial
-from sealag.kernels._jit import entry, inner, shared
+from sealag.kernels._jit import entry, inner
 from sealag.kernels.contact import (
     Instant,
     Plant,
@@ -40,7 +40,8 @@ MARGIN = 1e-9
 """m and body weights: a contact this close to changing is at its change. Ten times larger shows in
 the energy that an impact takes; ten times smaller asks more of the bisection than a step has."""
 SAME = 1e-9  # of a step: instants this close are one
-EVALUATE, SETTLE, STRIKE, STEP, STORE = range(5)  # what `act` does
+EVALUATE, SETTLE, STRIKE, STORE, STEP, GLIDE = range(6)
+"""What can be done with a plant: `act` does the first four, `run.move` the last two."""
 
 
 class Memory(NamedTuple):
@@ -146,7 +147,7 @@ def _close(plant, now, held, step, memory, following):
         following.tau_motor[j] = rotor.torque
 
 
-@shared
+@inner
 def take_step(physics, step):
     """Do a step in the present contact modes; return whether every instant has a solution."""
     plant, work, now, following = physics.plant, physics.work, physics.now, physics.following
@@ -234,15 +235,14 @@ def _copy(source, target):
 
 
 @inner
-def act(physics, what, step, touching, impulse):
+def act(physics, what, touching, impulse):
     """Do one thing with a plant.
 
     Args:
         physics: the plant.
         what: EVALUATE the present instant's dynamics and contact forces; SETTLE which touching
-            points are closed under its forces, or STRIKE them on the ground; try a STEP; or STORE
-            the present energies in the books.
-        step: length of a step, s.
+            points are closed under its forces, or STRIKE them on the ground; or STORE the present
+            energies in the books.
         touching: (P,) points that may be closed.
         impulse: (P, 3) of an impact, Ns, written.
 
@@ -255,8 +255,6 @@ def act(physics, what, step, touching, impulse):
     solved = True
     if what == EVALUATE:
         solved = accelerate(plant, now, work)
-    elif what == STEP:
-        solved = take_step(physics, step)
     else:
         _update_stores(physics)
     return SETTLED if solved else UNSOLVABLE, 0.0

@@ -1,6 +1,6 @@
 """What passes between two ticks of the controller, in one call.
 
-`glide` does step after step, with samples, commands, torque feedback and the log, until something
+`move` does step after step, with samples, commands, torque feedback and the log, until something
 needs Python: a tick, another load, a change of contact.
 """
 
@@ -17,16 +17,16 @@ from sealag.kernels.contact import (
     write_measurement,
 )
 from sealag.kernels.dynamics import KINETIC
+from sealag.kernels.friction import SETTLED, UNSOLVABLE
 from sealag.kernels.linalg import copy
-from sealag.kernels.plant import MARGIN, SAME, STORE, accept, act, take_step
+from sealag.kernels.plant import GLIDE, MARGIN, SAME, STEP, STORE, accept, act, take_step
 from sealag.typing import Array, IntArray
 
 LOAD, SAMPLE, TICK, TAKE = range(4)  # kinds of events, in their order at one instant
 WATCH, EVENTS, CLOSE, MOVE, INSIDE = range(5)
 """What comes next in a run: at a step's beginning watch, let events happen, close the instant
 (torque feedback and log), move; inside a step only events."""
-END, FALLEN, EVENT, STATE, BLOCKED = range(5)  # why `glide` returns
-GLIDE = STORE + 1  # what `act_or_glide` does besides what `plant.act` does
+END, FALLEN, EVENT, STATE, BLOCKED = range(5)  # why `move` returns from a run
 
 
 class Channels(NamedTuple):
@@ -169,20 +169,17 @@ def _happen(physics, channels, event):
 
 
 @inner
-def _slide(physics, step):
-    """Try a step in which no contact changes; False, with all as it was, if one does."""
-    contacts, following, before = physics.plant.contacts, physics.following, physics.memory.yielding
-    copy(contacts.yielding, before)
-    if take_step(physics, step) and np.isfinite(following.energy[KINETIC]):
-        measure_gaps(contacts, following)
-        smallest, _ = smallest_margin(
-            contacts.C, contacts.closed, contacts.weight, following.force, following.gap,
-            following.velocity,
-        )  # fmt: skip
-        if smallest >= -MARGIN:
-            return True
-    copy(before, contacts.yielding)
-    return False
+def _keeps_contacts(physics):
+    """Whether no contact changes in the step that was tried."""
+    contacts, following = physics.plant.contacts, physics.following
+    if not np.isfinite(following.energy[KINETIC]):
+        return False
+    measure_gaps(contacts, following)
+    smallest, _ = smallest_margin(
+        contacts.C, contacts.closed, contacts.weight, following.force, following.gap,
+        following.velocity,
+    )  # fmt: skip
+    return smallest >= -MARGIN
 
 
 class Course(NamedTuple):
@@ -220,81 +217,95 @@ class Cursor(NamedTuple):
 
 
 @entry
-def act_or_glide(kept, course, what, step, touching, impulse, cursor, said):
-    """Do one thing with a plant, or go on with a run: both share one compilation.
+def drive(kept, course, what, step, touching, impulse, cursor, said):
+    """Do one thing with a plant, or go on with a run: all shares one compilation.
 
     Args:
         kept: `Physics`.
         course: kept `Course`; idle where there is no run.
-        what: GLIDE, or what `plant.act` does.
-        step: its length of a step, s.
-        touching: its points that may be closed (P,).
-        impulse: (P, 3) of its impact, Ns, written.
+        what: what to do; try a STEP in the present contact modes, GLIDE through a run, or what
+            `plant.act` does.
+        step: length of the STEP, s.
+        touching: (P,) points that may be closed.
+        impulse: (P, 3) of an impact, Ns, written.
         cursor: raw `Cursor` of the run.
         said: instant at which the controller last stated its storage, s; inf if it states none.
 
     Returns:
-        What `act` or `glide` return; the number is what an impact took, J, or the instant, s.
+        What `plant.act` or `move` return: a status, what an impact took (J) or the instant (s), and
+        the raw `Cursor`.
     """
-    if what == GLIDE:
-        return glide(kept.parts, course.parts, Cursor(*cursor), said)
-    status, lost = act(kept.parts, what, step, touching, impulse)
-    return status, lost, Cursor(*cursor)
+    if what <= STORE:
+        status, lost = act(kept.parts, what, touching, impulse)
+        return status, lost, Cursor(*cursor)
+    return move(kept.parts, course.parts, what, step, Cursor(*cursor), said)
 
 
 @inner
-def glide(physics, course, at, said):
-    """Go on with a run until something needs Python.
+def move(physics, course, what, length, at, said):
+    """Try one step, or go on with a run until something needs Python.
 
     Args:
         physics: the plant.
         course: the run.
+        what: STEP or GLIDE.
+        length: of the STEP, s.
         at: `Cursor`.
         said: instant at which the controller last stated its storage, s; inf if it states none.
 
     Returns:
-        END; FALLEN if `Limits` are left; EVENT if an event needs Python, whose part it is to count
-        it; STATE if the controller must state its storage for the log; BLOCKED if a step needs
-        Python. The present instant, s. And the `Cursor`, that of BLOCKED behind the step.
+        SETTLED or UNSOLVABLE of a STEP; of a run END; FALLEN if `Limits` are left; EVENT if an
+        event needs Python, whose part it is to count it; STATE if the controller must state its
+        storage for the log; BLOCKED if a step needs Python. The present instant, s. And the
+        `Cursor`, that of BLOCKED behind the step.
     """
     plant, now = physics.plant, physics.now
     channels, periods, limits, log = course.channels, course.periods, course.limits, course.log
-    same = SAME * periods.step
+    same, span = SAME * periods.step, length
     time, step, event, part = at.time, at.step, at.event, at.part
+    begin = time
     profiled = plant.contacts.ground_x.size > 0 or plant.contacts.closed.size == 0
     while True:
-        if part == WATCH:
-            part = EVENTS
-            if step % periods.watch == 0 and (not profiled or _lost(plant, now, limits)):
-                return FALLEN, time, Cursor(time, step, event, part)
-        if part in (EVENTS, INSIDE):
-            while event < channels.due.size and channels.due[event] <= time + same:
-                if not _happen(physics, channels, event):
-                    return EVENT, time, Cursor(time, step, event, part)
-                event += 1
-            part = CLOSE if part == EVENTS else MOVE
-        if part == CLOSE:
-            logged = step % periods.log == 0 or step == periods.steps
-            if logged and said != np.inf and said != time:
-                return STATE, time, Cursor(time, step, event, part)
-            if channels.torque_known.size > 0 and step % periods.torque == 0:
-                look = step // periods.torque
-                _feed_torque(channels, periods, look, now, physics.held.known_torque)
-            if logged:
-                row = (step + periods.log - 1) // periods.log
-                _record(physics, channels, time, log, row)
-            if step == periods.steps:
-                return END, time, Cursor(time, step, event, part)
-            part = MOVE
-        begin, end = time, (step + 1) * periods.step
-        time, part = end, WATCH
-        if event < channels.due.size and channels.due[event] < end - same:
-            time, part = channels.due[event], INSIDE
-        else:
-            step += 1
-        span = time - begin
-        if abs(span - periods.step) <= same:
-            span = periods.step
-        if not (profiled and _slide(physics, span)):
+        if what == GLIDE:
+            if part == WATCH:
+                part = EVENTS
+                if step % periods.watch == 0 and (not profiled or _lost(plant, now, limits)):
+                    return FALLEN, time, Cursor(time, step, event, part)
+            if part in (EVENTS, INSIDE):
+                while event < channels.due.size and channels.due[event] <= time + same:
+                    if not _happen(physics, channels, event):
+                        return EVENT, time, Cursor(time, step, event, part)
+                    event += 1
+                part = CLOSE if part == EVENTS else MOVE
+            if part == CLOSE:
+                logged = step % periods.log == 0 or step == periods.steps
+                if logged and said != np.inf and said != time:
+                    return STATE, time, Cursor(time, step, event, part)
+                if channels.torque_known.size > 0 and step % periods.torque == 0:
+                    look = step // periods.torque
+                    _feed_torque(channels, periods, look, now, physics.held.known_torque)
+                if logged:
+                    row = (step + periods.log - 1) // periods.log
+                    _record(physics, channels, time, log, row)
+                if step == periods.steps:
+                    return END, time, Cursor(time, step, event, part)
+                part = MOVE
+            begin, end = time, (step + 1) * periods.step
+            time, part = end, WATCH
+            if event < channels.due.size and channels.due[event] < end - same:
+                time, part = channels.due[event], INSIDE
+            else:
+                step += 1
+            span = time - begin
+            if abs(span - periods.step) <= same:
+                span = periods.step
+            if not profiled:
+                return BLOCKED, begin, Cursor(time, step, event, part)
+            copy(plant.contacts.yielding, physics.memory.yielding)
+        solved = take_step(physics, span)
+        if what == STEP:
+            return SETTLED if solved else UNSOLVABLE, 0.0, at
+        if not (solved and _keeps_contacts(physics)):
+            copy(physics.memory.yielding, plant.contacts.yielding)
             return BLOCKED, begin, Cursor(time, step, event, part)
         accept(physics)

@@ -182,8 +182,8 @@ class Plant:
             cursor: Where it is.
             said: Instant at which the controller last stated its storage, s.
         """
-        return self._run.act_or_glide(
-            self._physics, course, self._run.GLIDE, 0.0, self.contacts.closed, self.impulse,
+        return self._run.drive(
+            self._physics, course, self._kernel.GLIDE, 0.0, self.contacts.closed, self.impulse,
             cursor, said,
         )  # fmt: skip
 
@@ -261,7 +261,7 @@ class Plant:
     ) -> tuple[int, float]:
         """Do one thing, see `kernels.plant.act`."""
         mask = self.contacts.closed if touching is None else touching
-        status, number, _ = self._run.act_or_glide(
+        status, number, _ = self._run.drive(
             self._physics, self._idle, what, step, mask, self.impulse, _NOWHERE, math.inf
         )
         return status, number
