@@ -16,9 +16,7 @@ solve_space = from_python(operational_space.operational_space)
 
 def space_of(nv, n, c, *, m):
     """Return the arrays of one operational space."""
-    return operational_space.divide(
-        np.zeros(operational_space.memory_size(nv, n, c, m)), nv, n, c, m
-    )
+    return operational_space.allocate(nv, n, c, m=m)
 
 
 def newton_of(nv, n, m, *, slope=None, J=None):
@@ -26,6 +24,6 @@ def newton_of(nv, n, m, *, slope=None, J=None):
     return control_law.Newton(
         H=np.zeros((nv, nv)), moved=np.zeros((nv, n)),
         slope=np.zeros((n, n)) if slope is None else np.array(slope, dtype=float),
-        J=np.zeros((m, n)) if J is None else np.ascontiguousarray(J), square=np.zeros((n, n)),
-        step=np.zeros(n),
+        J=np.zeros((m, n)) if J is None else np.ascontiguousarray(J), force=np.zeros((m, n)),
+        square=np.zeros((n, n)), step=np.zeros(n),
     )  # fmt: skip

@@ -1,5 +1,7 @@
 """Contact and rigid-body kernels against Pinocchio and plain NumPy."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,8 +14,15 @@ from sealag.whole_body import Measurement
 FEET = ("left_foot", "right_foot")
 SOLVE, SETTLE = from_python(friction.solve), from_python(friction.settle)
 PROJECT, CHOLESKY = from_python(contact.project), from_python(linalg.cholesky)
-EQUATIONS = from_python(friction.allocate_equations)
+WRITE_MEASUREMENT = from_python(contact.write_measurement)
 INTEGRATE, TANGENT_RATE = from_python(spatial.integrate), from_python(spatial.tangent_rate)
+
+
+class Feet(NamedTuple):
+    """What a measurement reads of the contacts."""
+
+    closed: np.ndarray
+    frame: np.ndarray
 
 
 class TestManifold:
@@ -48,7 +57,7 @@ def test_a_measurement_row():
     }  # fmt: skip
     now = contact.Instant(**{name: rng.normal(size=shape) for name, shape in shapes.items()})
     row = np.full(1 + 8 + 7 + 3 + 2, np.nan)
-    contact.sense(tuple(now), np.array([0, 1, 0]), np.array([0, 0, 1]), 0.5, row)
+    WRITE_MEASUREMENT(now, Feet(closed=np.array([0, 1, 0]), frame=np.array([0, 0, 1])), 0.5, row)
     seen = Measurement.allocate(nq=8, nv=7, n=1, contacts=2)
     seen.data[:] = row
     assert seen.time == 0.5
@@ -68,7 +77,7 @@ def _instant(hume, q, v):
 
 
 def _equations(M, right, J, C, target, closed):
-    eq = EQUATIONS(len(M), len(closed), 0)
+    eq = friction.allocate_equations(len(M), len(closed), 0)
     assert CHOLESKY(M, eq.L)
     PROJECT(eq.L, J, C, closed, eq.rows)
     eq.free[:], eq.target[:] = np.linalg.solve(eq.L, right), target

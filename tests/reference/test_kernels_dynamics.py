@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sealag.kernels import dynamics
+from sealag.kernels import dynamics, keep
 from sealag.robot import load_robot
 
 ROBOTS = (
@@ -46,10 +46,9 @@ def instant(urdf, request):
     if request.param:
         q[:3] += 50.0
     v, data, terms = rng.normal(size=model.nv), model.createData(), dynamics.allocate(robot.tree)
-    for _ in range(2):
-        dynamics.evaluate(
-            tuple(robot.tree), q, v, tuple(terms)
-        )  # nothing is left from the first time
+    kept = keep(dynamics.Model(robot.tree, terms))
+    for _ in range(2):  # nothing is left from the first time
+        dynamics.evaluate(kept, q, v)
     pin.computeAllTerms(model, data, q, v)
     return robot, q, v, terms, data
 
@@ -82,7 +81,7 @@ def test_frames_are_pinocchio_s(instant):
     ours = dynamics.allocate_frames(len(names), nv)
     for array in ours:
         array[:] = np.nan
-    dynamics.frames(tuple(terms), tuple(robot.frame_mounts(names)), tuple(ours))
+    dynamics.frames(keep(dynamics.Placed(terms, robot.frame_mounts(names), ours)))
     pin.updateFramePlacements(model, data)
     pin.forwardKinematics(model, data, q, v, np.zeros_like(v))
     pin.computeJointJacobians(model, data, q)
@@ -110,7 +109,7 @@ def test_gravity_gradient_is_pinocchio_s(instant):
     """Among the base's own directions its symmetric part."""
     robot, q, _, terms, data = instant
     H = np.full((robot.nv, robot.nv), np.nan)
-    dynamics.gravity_gradient(tuple(robot.tree), tuple(terms), H)
+    dynamics.gravity_gradient(keep(dynamics.Model(robot.tree, terms)), H)
     expected = pin.computeGeneralizedGravityDerivatives(robot._model, data, q)
     base = robot.nv_base
     expected[:base, :base] = 0.5 * (expected[:base, :base] + expected[:base, :base].T)

@@ -23,7 +23,7 @@ COLUMNS = (
     "K", "D_s", "B", "ratio", "D", "viscous", "coulomb", "limit", "speed", "bandwidth", "bearing",
 )  # fmt: skip
 TRAVEL, MOVE, RATES = (from_python(kernel) for kernel in (motor.travel, motor.move, motor.rates))
-LINK_WORK, SERIES = from_python(motor.link_work), from_python(motor.allocate_series)
+LINK_WORK, SERIES = from_python(motor.link_work), motor.allocate_series
 
 
 def parameters(**changes):

@@ -134,7 +134,7 @@ def test_cholesky_inverse_and_its_refusal():
 
 
 def low_rank_scratch(n):
-    return np.zeros((n, n)), np.zeros((5, n, n)), np.zeros(n)
+    return np.zeros((n, n)), np.zeros((5, n * n)), np.zeros(n)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-12])

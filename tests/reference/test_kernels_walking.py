@@ -6,15 +6,42 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from helpers.kernels import from_python
-from sealag.kernels import linalg, walking, walking_law, walking_state
+from sealag.kernels import dynamics, keep, linalg, walking, walking_law, walking_state
 from sealag.robot import load_robot
 
 NV, N = 12, 6
+FEET = ("left_foot", "right_foot")
 pendulum, constrain = from_python(walking.pendulum), from_python(walking_law.constrain)
 task_torques, least_squares = (
     from_python(walking_law.task_torques), from_python(linalg.least_squares),
 )  # fmt: skip
 predict, stand = from_python(walking_state.predict), from_python(walking_state.stand)
+law, carry = from_python(walking_law.law), from_python(walking_law.carry)
+SPRINGS = walking_law.Springs(
+    stiffness=np.full(N, 350.0), damping=np.zeros(N), lag=np.zeros(N), limit=np.full(N, np.inf),
+    table=np.zeros((N, 2, 4)),
+)  # fmt: skip
+GAINS = walking_law.Gains(
+    height_stiffness=100.0, posture_stiffness=110.0, swing_stiffness=400.0, height_damping=10.0,
+    posture_damping=11.0, swing_damping=20.0, planned=0.8, position_rate=10.0, damping=1e-14,
+)  # fmt: skip
+LEAD = walking_law.Lead(keep=0.7, time=5e-3, forward=1.0, feedback=0.5)
+
+
+def biped_of(robot, q, v, **parts):
+    """A robot as walking kernels know it, evaluated at q, v; parts replace what is usual."""
+    terms = dynamics.allocate(robot.tree)
+    dynamics.evaluate(keep(dynamics.Model(robot.tree, terms)), q, v)
+    usual = {
+        "springs": SPRINGS, "flight": walking_law.Flight(np.zeros(4), np.zeros((4, N))),
+        "motor": np.zeros((N, 2)), "anchor": np.zeros((2, 3)), "tau_sea": np.zeros(N),
+        "tau": np.zeros(N), "rates": np.zeros(N), "smooth": np.zeros(N), "lead": LEAD,
+    }  # fmt: skip
+    return walking_law.Biped(
+        tree=robot.tree, terms=terms, mounts=robot.frame_mounts(FEET),
+        feet=dynamics.allocate_frames(2, NV), gains=GAINS, q=q.copy(), v=v.copy(),
+        scratch=walking_law.allocate_scratch(NV, N), **(usual | parts),
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -70,9 +97,9 @@ def test_pendulum_against_an_adaptive_integrator():
 
 
 def _constrain(M, h, J, b):
-    a_0, P = np.full(NV, np.nan), np.full((NV, N), np.nan)
-    constrain(np.linalg.inv(M), h, J, b, a_0, P)
-    return a_0, P
+    scratch = walking_law.allocate_scratch(NV, N)
+    constrain(np.linalg.inv(M), h, J, b, scratch)
+    return scratch
 
 
 def test_constrained_accelerations_solve_the_saddle_point(terms):
@@ -84,20 +111,23 @@ def test_constrained_accelerations_solve_the_saddle_point(terms):
         full = np.block([[M, -rows.T], [rows, np.zeros((3 * feet, 3 * feet))]])
         right = np.concatenate([-h, -bias])
         right[NV - N : NV] += tau
-        a_0, P = _constrain(M, h, rows, bias)
-        np.testing.assert_allclose(a_0 + P @ tau, np.linalg.solve(full, right)[:NV], atol=1e-10)
+        at = _constrain(M, h, rows, bias)
+        np.testing.assert_allclose(
+            at.a_0 + at.P @ tau, np.linalg.solve(full, right)[:NV], atol=1e-10
+        )
 
 
 def test_task_torques_give_the_accelerations_wanted(terms):
     """J_t v̇ + J̇_t v is what was asked for; near a singularity the torque stays bounded."""
     M, h, J, b, rng = terms
     J_t, b_t, wanted = rng.standard_normal((N, NV)), rng.standard_normal(N), rng.standard_normal(N)
-    a_0, P = _constrain(M, h, J[0], b[0])
+    at = _constrain(M, h, J[0], b[0])
+    at.b_t[:] = b_t
     tau = np.full(N, np.nan)
-    task_torques(a_0, P, J_t, b_t, wanted, 1e-14, tau)
-    np.testing.assert_allclose(J_t @ (a_0 + P @ tau) + b_t, wanted, atol=1e-8)
+    task_torques(at, J_t, wanted, 1e-14, tau)
+    np.testing.assert_allclose(J_t @ (at.a_0 + at.P @ tau) + b_t, wanted, atol=1e-8)
     J_t[5] = J_t[4]
-    task_torques(a_0, P, J_t, b_t, wanted, 1e-6, tau)
+    task_torques(at, J_t, wanted, 1e-6, tau)
     assert np.abs(tau).max() < 1e5
 
 
@@ -105,7 +135,7 @@ def test_damped_least_squares_against_its_plain_twin(terms):
     """(AᵀA + δ trace(AᵀA)) x = Aᵀ r."""
     A, r = terms[0], terms[4].standard_normal(NV)
     x, G = np.full(NV, np.nan), A.T @ A
-    least_squares(A, r, 1e-3, x)
+    least_squares(A, r, 1e-3, x, np.zeros((2, NV, NV)))
     plain = np.linalg.solve(G + 1e-3 * np.trace(G) * np.eye(NV), A.T @ r)
     np.testing.assert_allclose(x, plain, rtol=1e-10)
 
@@ -132,10 +162,10 @@ def plain_predict(M, h, J, b, q, v, motor, K, table, *, start, period, ticks, se
 
 
 @pytest.mark.parametrize(("begin", "end"), [(-1.0, -0.5), (0.004, 0.009), (1.0, 2.0)])
-def test_prediction_against_its_plain_twin(terms, begin, end):
+def test_prediction_against_its_plain_twin(hume, terms, begin, end):
     """Support before, within and after the weight transfer; commands arrive one after another."""
     M, h, J, b, rng = terms
-    q, v, motor = rng.standard_normal(N), rng.standard_normal(NV), rng.standard_normal((N, 2))
+    q, v, motor = rng.standard_normal(NV + 1), rng.standard_normal(NV), rng.standard_normal((N, 2))
     K = np.full(N, 350.0)
     A = np.zeros((4, 4))
     A[0, 1] = A[2, 3] = 1.0
@@ -148,20 +178,20 @@ def test_prediction_against_its_plain_twin(terms, begin, end):
         arrival[place], command[place] = 0.002 * (k - 4), rng.standard_normal(N)
         sent.append((arrival[place], command[place].copy()))
     expected = plain_predict(
-        M, h, J, b, q, v, motor, K, table, start=0.0, period=1e-3, ticks=15, sent=sent,
+        M, h, J, b, q[-N:], v, motor, K, table, start=0.0, period=1e-3, ticks=15, sent=sent,
         begin=begin, end=end,
     )  # fmt: skip
-    speed, drive = v.copy(), motor.copy()
-    moved = predict(
-        walking_state.Links(M, h, J, b),
-        q,
-        speed,
-        drive,
-        walking_state.Springs(K, table),
-        walking_state.Timing(0.0, 1e-3, 15, begin, end),
-        walking_state.Flight(arrival, command, 10 % 8),
-    )
-    for got, wanted in zip((moved, speed, drive), expected, strict=True):
+    robot, _, _, _ = hume
+    biped = biped_of(
+        robot, q, v, springs=SPRINGS._replace(stiffness=K, table=table), motor=motor.copy(),
+        flight=walking_law.Flight(arrival, command),
+    )  # fmt: skip
+    timing = walking_state.Timing(
+        measured=0.0, period=1e-3, ticks=15, touchdown=begin, lift_off=end, stance=0, foot=-1,
+        newest=10 % 8,
+    )  # fmt: skip
+    predict(walking_state.Links(M, h, J, b), biped, timing)
+    for got, wanted in zip((biped.scratch.moved, biped.v, biped.motor), expected, strict=True):
         np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9)
 
 
@@ -216,65 +246,56 @@ def hume():
     return robot, q, v, at
 
 
-FEET = ("left_foot", "right_foot")
-
-
 @pytest.mark.parametrize("foot", [0, 1])
 def test_odometry_is_an_evaluation_at_the_corrected_state(hume, foot):
     """The boosted terms are those that Pinocchio finds at the corrected place and velocity."""
-    robot, q, v, at = hume
-    J, b, h, anchor = np.zeros((2, 6, NV)), np.zeros((2, 3)), np.zeros(NV), np.ones((2, 3))
-    there, rate = q.copy(), v.copy()
-    stand(at.terms, robot.frame_mounts(FEET), there, rate, h, foot, anchor, J, b)
+    robot, q, v, _ = hume
+    biped = biped_of(robot, q, v, anchor=np.ones((2, 3)))
+    stand(biped, foot)
+    there, rate, anchor = biped.q, biped.v, biped.anchor
     plain = robot.workspace()
     plain.update(there, rate)
     np.testing.assert_allclose(plain.frame_placement(FEET[foot])[1], anchor[foot], atol=1e-12)
     np.testing.assert_allclose(plain.frame_velocity(FEET[foot])[:3], 0.0, atol=1e-12)
     np.testing.assert_allclose(there[3:], q[3:])
     np.testing.assert_allclose(rate[3:], v[3:])
-    np.testing.assert_allclose(h, plain.nle, atol=1e-11)
+    np.testing.assert_allclose(biped.scratch.h, plain.nle, atol=1e-11)
     for f, name in enumerate(FEET):
-        np.testing.assert_allclose(J[f], plain.frame_jacobian(name), atol=1e-13)
-        np.testing.assert_allclose(b[f], plain.frame_bias(name)[:3], atol=1e-12)
+        np.testing.assert_allclose(biped.feet.J[f], plain.frame_jacobian(name), atol=1e-13)
+        np.testing.assert_allclose(biped.feet.drift[f, :3], plain.frame_bias(name)[:3], atol=1e-12)
 
 
 def test_extrapolation_and_springs(hume):
     """Without commands in flight v is extrapolated; the springs follow from motors and links."""
-    robot, q, v, at = hume
-    there, rate, tau, K = q.copy(), v.copy(), np.zeros(N), np.full(N, 350.0)
-    motor, ring = np.column_stack([q[-N:] + 0.1, v[-N:]]), (np.zeros(4), np.zeros((4, N)))
-    walking_state.foresee(
-        (tuple(robot.tree), tuple(at.terms), tuple(robot.frame_mounts(FEET))),
-        tuple(walking_state.Support(stance=0, foot=-1, anchor=np.zeros((2, 3)))),
-        tuple(walking_state.Springs(K, np.zeros((N, 2, 4)))),
-        tuple(walking_state.Timing(0.0, 1e-3, ticks=-20, touchdown=0.0, lift_off=0.0)),
-        tuple(walking_state.Flight(*ring, newest=0)), there, rate, motor, tau,
+    robot, q, v, _ = hume
+    biped = biped_of(robot, q, v, motor=np.column_stack([q[-N:] + 0.1, v[-N:]]))
+    timing = walking_state.Timing(
+        measured=0.0, period=1e-3, ticks=-20, touchdown=0.0, lift_off=0.0, stance=0, foot=-1,
+        newest=0,
     )  # fmt: skip
+    walking_state.foresee(keep(biped), tuple(timing))
     expected = robot.integrate(q, 0.02 * v)
-    np.testing.assert_allclose(there, expected, atol=1e-12)
-    np.testing.assert_allclose(tau, 350.0 * (motor[:, 0] - expected[-N:]))
-    np.testing.assert_allclose(at.nle, robot.nonlinear_effects(there, rate), atol=1e-12)
-    at.update(q, v)
+    np.testing.assert_allclose(biped.q, expected, atol=1e-12)
+    np.testing.assert_allclose(biped.tau_sea, 350.0 * (biped.motor[:, 0] - expected[-N:]))
+    there = robot.nonlinear_effects(biped.q, biped.v)
+    np.testing.assert_allclose(biped.terms.nle, there, atol=1e-12)
 
 
 @pytest.mark.parametrize("phase", [0.02, 0.2])
 def test_law_against_its_plain_twin(hume, phase):
     """Task accelerations of one foot, or the blend of both feet's; planned joint rates."""
-    robot, _, v, at = hume
+    robot, q, v, at = hume
     rng = np.random.default_rng(8)
     height, swing = np.array([0.9, 0.1, 0.2, 0.0, 0.0, 0.0]), rng.normal(size=(3, 3))
-    gains = walking_law.Gains(
-        height_stiffness=100.0, posture_stiffness=110.0, swing_stiffness=400.0, height_damping=10.0,
-        posture_damping=11.0, swing_damping=20.0, planned=0.8, position_rate=10.0, damping=1e-14,
-    )  # fmt: skip
-    tau, rates, transfer = np.zeros(N), np.zeros(N), 0.06
+    transfer = 0.06
     com = at.com, at.com_velocity, at.com_bias(), at.com_jacobian()
     wish = walking_law.Reference(
         height=height, height_time=0.1, swing=swing, phase=phase, transfer_time=transfer, stance=0,
         still=False,
     )  # fmt: skip
-    body = tuple(at.terms), tuple(robot.frame_mounts(FEET))
-    assert walking_law.law(body, v, at.nle, tuple(wish), tuple(gains), tau, rates)
+    biped = biped_of(robot, q, v)
+    assert law(biped, wish)
+    tau, rates = biped.tau, biped.rates
     z = 0.9 + 0.01 + 0.002, 0.1 + 0.04, 0.4
     R = at.terms.rotation[1]
     yaw = np.arctan2(R[1, 0], R[0, 0])
@@ -310,7 +331,7 @@ def test_law_against_its_plain_twin(hume, phase):
     np.testing.assert_allclose(rates, np.linalg.solve(rows, speed)[6:], rtol=1e-4, atol=1e-5)
 
 
-def test_command_against_its_plain_twin():
+def test_command_against_its_plain_twin(hume):
     """Limits, lead, velocity feedforward and torque feedback, each as it is written."""
     rng = np.random.default_rng(9)
     tau, smooth, rates, sea, D, ratio = rng.normal(size=(6, N))
@@ -318,10 +339,15 @@ def test_command_against_its_plain_twin():
     clipped = np.clip(tau, -0.8, 0.8)
     average = clipped + 0.7 * (smooth - clipped)
     plain = average + ratio * (clipped - average) / 5e-3 + D * rates + 0.5 * (clipped - sea)
-    lead = walking_law.Lead(keep=0.7, time=5e-3, forward=1.0, feedback=0.5)
-    walking_law.carry(tau, limit, smooth, rates, sea, D, ratio, tuple(lead), command)
+    robot, q, v, _ = hume
+    springs = SPRINGS._replace(damping=D.copy(), lag=ratio.copy(), limit=limit)
+    biped = biped_of(
+        robot, q, v, springs=springs, tau=tau.copy(), smooth=smooth.copy(), rates=rates.copy(),
+        tau_sea=sea.copy(),
+    )  # fmt: skip
+    carry(biped, command)
+    smooth = biped.smooth
     np.testing.assert_allclose(command, plain)
     np.testing.assert_allclose(smooth, average)
-    lead = lead._replace(time=0.0, forward=0.0, feedback=0.0)
-    walking_law.carry(tau, limit, smooth, rates, sea, D, ratio, tuple(lead), command)
+    carry(biped._replace(lead=LEAD._replace(time=0.0, forward=0.0, feedback=0.0)), command)
     np.testing.assert_allclose(command, clipped)

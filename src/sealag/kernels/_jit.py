@@ -72,7 +72,9 @@ _INNER: dict[str, Any] = {
     "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _Inlined, "_nrt": False,
 }  # fmt: skip
 
-entry = njit(cache=True, no_cfunc_wrapper=True, _nrt=True)
+_ENTRY: dict[str, Any] = {"cache": True, "no_cfunc_wrapper": True}
+
+entry = njit(**_ENTRY)
 """Called from Python, and kept on disk with all that it calls."""
 
 inner = njit(forceinline=True, **_INNER)

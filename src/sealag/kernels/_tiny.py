@@ -9,7 +9,6 @@ from sealag.kernels import (
     contact,
     control_law,
     dynamics,
-    keep,
     motor,
     numerical_radius,
     operational_space,
@@ -20,6 +19,7 @@ from sealag.kernels import (
     walking_law,
     walking_state,
 )
+from sealag.kernels._jit import keep
 
 _NV, _NQ = 7, 8  # a free body and one joint
 
@@ -147,9 +147,7 @@ def _step() -> None:
     plant.sense(kept, 0.0, np.zeros(1 + _NQ + _NV + 3 + 2))
     motor.rate_rows(tuple(parts.motors), True, np.zeros((6, 1)), np.zeros((6, 1)))
     start = (0.0, 0, 0, run.WATCH)
-    run.drive(
-        kept, keep(run.idle(1)), plant.STORE, 1e-3, parts.contacts.closed, three, start, 1.0
-    )
+    run.drive(kept, keep(run.idle(1)), plant.STORE, 1e-3, parts.contacts.closed, three, start, 1.0)
 
 
 def _different(kind: Any) -> Any:
@@ -166,7 +164,10 @@ def _walk() -> None:
     walking.capture_end(three, three, six[:2], tuple(step), gait, 1.0, np.zeros((2, 2)))
     walking.swing(np.zeros((3, 3)), three, 0.1, 1e-3, plan, 0.0, 0.1)
     tree = _tree(6)
-    springs = walking_law.Springs(*np.ones((4, 6)).copy(), np.zeros((6, 2, 4)))
+    springs = walking_law.Springs(
+        stiffness=np.ones(6), damping=six.copy(), lag=six.copy(), limit=np.ones(6),
+        table=np.zeros((6, 2, 4)),
+    )  # fmt: skip
     biped = walking_law.Biped(
         tree=tree, terms=dynamics.allocate(tree), mounts=_mounts(2, 12),
         feet=dynamics.allocate_frames(2, 12), springs=springs,

@@ -108,7 +108,10 @@ class Series(NamedTuple):
 
 def allocate_series() -> Series:
     """Return memory for one rotor's series."""
-    return Series(*(np.zeros(_TERMS) for _ in range(3)), np.zeros((3, len(_PLACES))))
+    return Series(
+        speed=np.zeros(_TERMS), spring=np.zeros(_TERMS), torque=np.zeros(_TERMS),
+        values=np.zeros((3, len(_PLACES))),
+    )  # fmt: skip
 
 
 @inner

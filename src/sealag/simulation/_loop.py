@@ -251,7 +251,7 @@ class _Loop:
             outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
         if not self._filled():
             still = self._course_of(self._periods._replace(steps=0))
-            closing = (0.0, 0, len(self._channels.due), self._kernel.CLOSE)
+            closing = self._kernel.Cursor(0.0, 0, len(self._channels.due), self._kernel.CLOSE)
             self.plant.glide(still, closing, math.inf)
         return self._result(outcome, message)
 
@@ -262,10 +262,10 @@ class _Loop:
     def _glide(self, progress: Callable[[float], None] | None) -> None:
         """Go on from one thing that needs Python to the next, until the end."""
         kernel, plant, channels = self._kernel, self.plant, self._channels
-        cursor, course = (0.0, 0, 0, kernel.WATCH), self._course
+        cursor, course = kernel.Cursor(0.0, 0, 0, kernel.WATCH), self._course
         shown, every = 0, max(1, round(0.1 / self.clock.physics))
         while True:
-            why, plant.time, cursor = plant.glide(course, tuple(cursor), self._said)
+            why, plant.time, cursor = plant.glide(course, cursor, self._said)
             time, step, event, part = cursor
             if progress is not None and step > shown:  # what was there then is logged
                 progress(plant.time)
@@ -279,7 +279,7 @@ class _Loop:
             elif why == kernel.BLOCKED:
                 plant.advance(time, plant.held.command, plant.held.known_torque)
             else:
-                cursor = (time, step, event + 1, part)
+                cursor = kernel.Cursor(time, step, event + 1, part)
                 if channels.kind[event] == kernel.TICK:
                     self._tick(int(channels.tick[event]))
                 else:

@@ -172,9 +172,7 @@ class Plant:
         self._kernel.sense(self._physics, t, out)
 
     # Motion ------------------------------------------------------------------------------------
-    def glide(
-        self, course: Any, cursor: "tuple[float, int, int, int]", said: float
-    ) -> "tuple[int, float, Cursor]":
+    def glide(self, course: Any, cursor: "Cursor", said: float) -> "tuple[int, float, Cursor]":
         """Go on with a run until something needs Python, see `kernels.run.glide`.
 
         Args:
@@ -184,7 +182,7 @@ class Plant:
         """
         return self._run.drive(
             self._physics, course, self._kernel.GLIDE, 0.0, self.contacts.closed, self.impulse,
-            cursor, said,
+            tuple(cursor), said,
         )  # fmt: skip
 
     def push(self, load: Array) -> None:
