@@ -99,7 +99,7 @@ class Kept(structref.StructRefProxy):
 structref.define_proxy(Kept, _KeptType, ["parts"])
 
 
-@njit(cache=True)
+@entry
 def keep(parts):
     """Return a NamedTuple of arrays, numbers and such NamedTuples for kernels; arrays stay live."""
     return Kept(parts)

@@ -11,7 +11,7 @@ from sealag.typing import Array
 from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._law import Law
 from sealag.whole_body._links import LinkPlant, null_space
-from sealag.whole_body._signal_states import SignalState
+from sealag.whole_body._signal_states import LawDerivative, SignalState
 
 _BALANCED = 1e-10
 """Share of weight and torques that may be left over. Ten times smaller is rounding of the law; at
@@ -29,6 +29,10 @@ _PLACED = 1e-12  # m, rad: how far a contact may be from where the posture has i
 _ROUNDS = 60
 _LONGEST_STEP = 0.2  # rad: a longer Newton step leaves the region where its direction is good
 _HALVINGS = 12
+_QUICK = 0.1
+"""Part of the residual that a step may leave for the law's derivative to serve once more: one costs
+as much as thirty steps, so that it is taken anew only where it no longer leads on."""
+
 _PATIENCE = 12  # whole steps that need not bring the least residual yet
 _CUTOFF = 1e-10  # of the largest singular value: directions along which nothing acts (symmetries)
 
@@ -149,12 +153,21 @@ class _Search:
         ones: a soft law sags past where the residual is larger."""
         q, theta = self._posture, self._first(self._posture)
         residual = self._residual(q, theta)
-        least, since = self._size(residual), 0
+        least, since, slope = self._size(residual), 0, None
         for _ in range(_ROUNDS):
             if self._small(residual):
+                if slope is not None:  # digits that a last Newton step would have brought
+                    step = self._newton(q, theta, residual, slope)
+                    q, theta, _, _ = self._search(q, theta, step, residual, falling=True)
                 return q, theta
-            step = self._newton(q, theta, residual)
+            kept, before = slope is not None, self._size(residual)
+            slope = slope or self._signal.derivative(q, theta)
+            step = self._newton(q, theta, residual, slope)
             q, theta, residual, moved = self._search(q, theta, step, residual, falling=falling)
+            if self._size(residual) > _QUICK * before:
+                slope = None
+                if kept and not moved:
+                    continue
             since = 0 if self._size(residual) < least else since + 1
             least = min(least, self._size(residual))
             if not moved or since > _PATIENCE:
@@ -220,7 +233,9 @@ class _Search:
         away, force, torque = (float(np.linalg.norm(part)) for part in residual)
         return away + (force + torque) / self._scale
 
-    def _newton(self, q: Array, theta: Array, residual: tuple[Array, Array, Array]) -> Array:
+    def _newton(
+        self, q: Array, theta: Array, residual: tuple[Array, Array, Array], slope: LawDerivative
+    ) -> Array:
         """Step (nv + n,) of least norm."""
         robot, n, K = self._robot, self._robot.n, np.diag(self._K)
         base = robot.nv_base
@@ -230,7 +245,6 @@ class _Search:
         H = self._plant.stiffness(q, springs, np.eye(robot.nv))
         H[base:, base:] += K
         coupling = np.vstack([np.zeros((base, n)), -K])
-        slope = self._signal.derivative(q, theta)
         C_q, C_theta = slope.C_q, slope.C_theta
         if len(slope.A):  # at rest the memory has settled: A ξ + B δ = 0
             follow = slope.C @ np.linalg.inv(-slope.A)
