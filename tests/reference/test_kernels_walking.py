@@ -202,10 +202,12 @@ def test_foothold_against_its_plain_twin(side):
     old, new, com = np.array([-0.2, 0.2, 0.0]), np.zeros(3), np.array([-0.05, 0.1, 0.9])
     speed, momentum = np.array([0.5, -0.1, 0.0]), np.array([0.02, -0.01])
     gait = walking.Gait(
-        step_time=0.35, transfer_time=0.06, rate=3.4, growth=3.3, carried=1.4, end_forward=0.2,
-        end_outward=0.1, nearest=-0.15, farthest=0.55, narrowest=0.12, widest=0.5, side=side,
+        step_time=0.35, transfer_time=0.06, rate=3.4, growth=3.3, carried=1.4, end_outward=0.1,
+        nearest=-0.15, farthest=0.55, narrowest=0.12, widest=0.5,
     )  # fmt: skip
-    step = walking.StepNow(old, new, height, 0.02, 0.1)
+    step = walking.StepNow(
+        old=old, new=new, height=height, offset=0.02, phase=0.1, side=side, end_forward=0.2
+    )
     memory = np.array([[0.1, 0.05], [0.6, 0.2]])
     x, v = com[:2].copy(), speed[:2] + momentum
     pendulum(x, v, 0.1, 0.35, 0.06, old, new, height, 0.02, 16)

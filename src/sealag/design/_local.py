@@ -1,13 +1,13 @@
 """Stability and delay margin of the law that runs, decided over all instants of a motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sealag.design._criteria import ASYMMETRY_TOLERANCE
 from sealag.design._system import System
 from sealag.errors import ContractionError, SolverError
-from sealag.margin import DelayMargin, delay_margin
+from sealag.margin import DelayMargin, delay_margin, rightmost_roots
 from sealag.passivity import Basis, LocalLoop, Place
 from sealag.robot import Motion
 from sealag.typing import Array
@@ -20,6 +20,11 @@ _FEW = 50  # instants up to which all are decided, also once one is known to be 
 _AT_REST = 1e-7
 """Share of weight and torques that may be unbalanced in a posture that counts as at rest. Ten times
 less loses postures of stiff contacts; ten times more takes sagging ones for equilibria."""
+
+_DRIFT = 1e-9
+"""1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
+
+_MOST_DRIFTING = 8  # zero roots that are counted
 
 _MINIMUM = 1e-9
 """Share of the largest curvature above which a potential has a strict minimum. Ten times less is
@@ -316,11 +321,14 @@ class _Decision:
 def margin_of(loop: FrozenLoop, **choices: object) -> DelayMargin:
     """Return the exact margin of a frozen loop; see `sealag.margin.delay_margin`.
 
+    Where compensation cancels gravity, what is left of a zero root is the rounding of the loop's
+    entries: a root without delay that is no further than that from the axis is not stable.
+
     Args:
         loop: the loop.
         choices: further arguments of `delay_margin`.
     """
-    return delay_margin(
+    found = delay_margin(
         loop.A_0,
         loop.A_1,
         A_e=loop.A_e,
@@ -328,6 +336,21 @@ def margin_of(loop: FrozenLoop, **choices: object) -> DelayMargin:
         symmetries=loop.symmetries,
         **choices,  # pyright: ignore[reportArgumentType]
     )
+    if found.unstable_roots or not len(loop.A_0):
+        return found
+    rightmost = rightmost_roots(
+        loop.A_0,
+        loop.A_1,
+        0.0,
+        A_e=loop.A_e,
+        embedded_delay=loop.embedded_delay,
+        count=_MOST_DRIFTING,
+        symmetries=loop.symmetries,
+    )
+    drifting = int((rightmost.real > -_DRIFT).sum())
+    if not drifting:
+        return found
+    return replace(found, delay=0.0, unstable_roots=drifting, guaranteed=False)
 
 
 def _spread(instants: Array, most: int) -> Array:

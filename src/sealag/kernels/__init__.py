@@ -26,7 +26,7 @@ def keep(parts: Any) -> Any:
 
 
 def compile_all(progress: Callable[[str], None], *, missing_only: bool = False) -> None:
-    """Compile and cache kernels: some three minutes after an installation, then never again.
+    """Compile and cache kernels: one to two minutes after an installation, then never again.
 
     Args:
         progress: called with the name of each module before it is compiled.

@@ -159,7 +159,9 @@ def _walk() -> None:
     six, three, q = np.zeros(6), np.zeros(3), _upright(6)
     walking.quintic(three, three, 1.0, six)
     walking.quintic_at(six, 0.5, three.copy())
-    step = walking.StepNow(old=three, new=three, height=six, offset=0.0, phase=0.1)
+    step = walking.StepNow(
+        old=three, new=three, height=six, offset=0.0, phase=0.1, side=1.0, end_forward=0.1
+    )
     gait, plan = tuple(_different(walking.Gait)), tuple(_different(walking.SwingPlan))
     walking.capture_end(three, three, six[:2], tuple(step), gait, 1.0, np.zeros((2, 2)))
     walking.swing(np.zeros((3, 3)), three, 0.1, 1e-3, plan, 0.0, 0.1)

@@ -26,11 +26,11 @@ from sealag.kernels.ledger import (
 )
 from sealag.typing import Array
 
-_REACH = 1.0
-"""Rate times time of one series. Twice as far, Gauss' rule of eight places leaves 1e-13."""
+_REACH = 1.5
+"""Rate times time of one series. A third further, Gauss' rule of eight places leaves 1e-13."""
 _LEFT_OUT = 1e-18  # relative size of the first term of the exponential that is left out
 _FORCED = 3  # terms that a cubic link motion appends
-_TERMS = 26  # more than `_order` asks for at _REACH
+_TERMS = 28  # more than `_order` asks for at _REACH
 _PLACES, _WEIGHTS = (part.copy() for part in np.polynomial.legendre.leggauss(8))
 _PLACES, _WEIGHTS = 0.5 * (1.0 + _PLACES), 0.5 * _WEIGHTS
 _TURNS = 8  # changes of a rotor's direction in one step

@@ -92,13 +92,11 @@ class Gait(NamedTuple):
     rate: float  # ω of the pendulum, 1/s
     growth: float  # e = exp(ω T)
     carried: float  # κ, the part of it that the old foot still carries
-    end_forward: float  # wanted capture point at the end of a step, from the foot stood on, m
-    end_outward: float  # m
+    end_outward: float  # wanted capture point at the end of a step, from the foot stood on, m
     nearest: float  # bounds of the foothold from the foot stood on: forward, m
     farthest: float
     narrowest: float  # and outward, m
     widest: float
-    side: float  # sign of y from the foot stood on outward
 
 
 class StepNow(NamedTuple):
@@ -109,6 +107,8 @@ class StepNow(NamedTuple):
     height: Array  # (6,) quintic of the height over the world's zero
     offset: float  # phase at which the quintic's time is 0, s
     phase: float  # now, s
+    side: float  # sign of y from the foot stood on outward
+    end_forward: float  # wanted capture point at its end, from the foot stood on, m
 
 
 class SwingPlan(NamedTuple):
@@ -137,7 +137,7 @@ def capture_end(com, speed, momentum, raw_step, raw_gait, share, memory):
         x and y of the foothold, m.
     """
     step, gait = StepNow(*raw_step), Gait(*raw_gait)
-    new, side = step.new, gait.side
+    new, side = step.new, step.side
     x, v = com[:2].copy(), speed[:2] + momentum
     pendulum(
         x, v, step.phase, gait.step_time, gait.transfer_time, step.old, new, step.height,
@@ -147,7 +147,7 @@ def capture_end(com, speed, momentum, raw_step, raw_gait, share, memory):
         memory[0, k] += share * (x[k] - memory[0, k])
         memory[1, k] += share * (v[k] - memory[1, k])
         capture = memory[0, k] + memory[1, k] / gait.rate - new[k]
-        wanted = gait.end_forward if k == 0 else -side * gait.end_outward
+        wanted = step.end_forward if k == 0 else -side * gait.end_outward
         x[k] = (gait.growth * capture - wanted) / (gait.growth - gait.carried)
     forward = min(max(x[0], gait.nearest), gait.farthest)
     outward = min(max(side * x[1], gait.narrowest), gait.widest)

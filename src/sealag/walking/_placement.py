@@ -34,12 +34,12 @@ class Placement:
         self.plan = gait.periodic()
         plan = self.plan
         nearest, farthest = _FORWARD
-        self._wanted = walking.Gait(
+        wanted = walking.Gait(
             step_time=gait.step_time, transfer_time=gait.transfer_time, rate=plan.rate,
-            growth=plan.growth, carried=plan.carried, end_forward=plan.end_forward,
-            end_outward=plan.end_outward, nearest=nearest, farthest=farthest,
-            narrowest=gait.smallest_width, widest=_WIDEST, side=1.0,
+            growth=plan.growth, carried=plan.carried, end_outward=plan.end_outward,
+            nearest=nearest, farthest=farthest, narrowest=gait.smallest_width, widest=_WIDEST,
         )  # fmt: skip
+        self._wanted = tuple(wanted)
         self._end, self._momentum = np.zeros((2, 2)), np.zeros(2)
         self._fresh = True
         self._started, self._before, self._faster = False, 0.0, 0.0
@@ -73,12 +73,12 @@ class Placement:
             share = 1.0 - math.exp(-period / options.placement_time)
         self._fresh = False
         faster = 1.0 + (self._faster if options.bias_gain > 0.0 else 0.0)
-        wanted = self._wanted._replace(
-            end_forward=self.plan.end_forward * faster, side=step.outward
-        )
-        now = kernel.StepNow(step.old, step.new, step.height, step.offset, phase)
+        now = kernel.StepNow(
+            old=step.old, new=step.new, height=step.height, offset=step.offset, phase=phase,
+            side=step.outward, end_forward=self.plan.end_forward * faster,
+        )  # fmt: skip
         x, y = kernel.capture_end(
-            com, com_rate, momentum, tuple(now), tuple(wanted), share, self._end
+            com, com_rate, momentum, tuple(now), self._wanted, share, self._end
         )
         if gait.step_time - phase > options.placement_freeze:
             step.target[0], step.target[1], step.target[2] = x, y, step.foot_height(x, y)

@@ -13,6 +13,8 @@ FIRST_CELLS = 64
 """Cells of the unit circle before bisection."""
 MOST_SPECTRA = 4000
 """Points of the unit circle at most; a scan that needs more has lost its way."""
+ROUNDED = 1e-15
+"""Of the characteristic matrix: a smaller value is 0."""
 DEEPEST = 1e-9
 CLUSTER = 1e-6
 """Relative distance below which eigenvalues share one subspace."""
@@ -189,6 +191,8 @@ def _exact_crossing(
         T, slope = _characteristic(A_0, [*fixed, moved], 1j * omega)
         w, v = _null_vectors(T)
         value = w @ T @ v
+        if abs(value) <= ROUNDED * float(np.linalg.norm(T, 2)):
+            break  # where a root only touches the axis, a further step would lead away
         by_omega = 1j * (w @ slope @ v)
         by_delay = 1j * omega * np.exp(-1j * omega * delay) * (w @ late.B @ late.C @ v)
         J = np.array([[by_omega.real, by_delay.real], [by_omega.imag, by_delay.imag]])
