@@ -10,7 +10,7 @@ from helpers.small_systems import arm, arm_system, joint_task
 from sealag.design import load, margin_of
 from sealag.margin import delay_margin
 from sealag.robot import Contact
-from sealag.whole_body import FrozenLoop, Law, LinkAngles, MotorAngles, StaticJoint, freeze
+from sealag.whole_body import FrozenLoop, Law, LinkAngles, MotorAngles, StaticJoint
 
 HUME = load("bundled:hume")
 GAIN = 30.0
@@ -122,7 +122,7 @@ def test_loop_is_the_one_written_out(tmp_path, count, damping, part):
 def test_late_torque_feedback_has_a_delay_of_its_own(tmp_path, part):
     system = system_of(tmp_path, **PARTS[part])
     rest = system.rest()
-    loop = freeze(
+    loop = FrozenLoop.of(
         system.robot, system.law, system.actuators, system.posture, contacts=(), rest=rest,
         embedded_delay=0.004,
     )  # fmt: skip
@@ -138,7 +138,7 @@ def test_late_torque_feedback_has_a_delay_of_its_own(tmp_path, part):
 
 def test_without_shaping_there_is_no_torque_feedback_to_be_late(tmp_path):
     system = system_of(tmp_path, inertia_shaping=1.0)
-    loop = freeze(
+    loop = FrozenLoop.of(
         system.robot, system.law, system.actuators, system.posture, contacts=(),
         rest=system.rest(), embedded_delay=0.004,
     )  # fmt: skip

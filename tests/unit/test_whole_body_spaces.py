@@ -12,12 +12,12 @@ from sealag.robot import Contact, ContactKind, Motion
 from sealag.whole_body import (
     GravityCompensation,
     MotorAngles,
+    Spaces,
     StaticJoint,
     StiffnessForm,
     Task,
     TaskKind,
     relative_asymmetry,
-    spaces_along,
 )
 
 HUME = load("bundled:hume")
@@ -41,7 +41,7 @@ def spaces_of(system, q=None, contacts=None, **changes):
     contacts = system.contacts if contacts is None else contacts
     q = system.posture if q is None else q
     changes = {"signal": MotorAngles(), "gravity": GravityCompensation.NONE, **changes}
-    return spaces_along(
+    return Spaces.along(
         system.robot,
         replace(system.law, **changes),
         system.actuators,

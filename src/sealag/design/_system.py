@@ -22,10 +22,6 @@ from sealag.whole_body import (
     Law,
     Rest,
     Spaces,
-    freeze,
-    posture_of,
-    rest_of,
-    spaces_along,
 )
 
 if TYPE_CHECKING:
@@ -151,7 +147,7 @@ class System:
         Raises:
             RobotError: a mass matrix is not positive definite.
         """
-        return spaces_along(self.robot, self.law, self.actuators, motion or self.still())
+        return Spaces.along(self.robot, self.law, self.actuators, motion or self.still())
 
     def rest(self, motion: Motion | None = None, instant: int = 0) -> Rest:
         """Return where the loop rests while it holds an instant of a motion, or the posture.
@@ -161,7 +157,7 @@ class System:
             instant: which one.
         """
         q, contacts = self._held(motion, instant)
-        return rest_of(self.robot, self.law, self.actuators, q, contacts=contacts)
+        return Rest.of(self.robot, self.law, self.actuators, q, contacts=contacts)
 
     def in_posture(self, motion: Motion | None = None, instant: int = 0) -> Rest:
         """Return the loop's state in an instant's configuration: tasks without error, springs
@@ -172,7 +168,7 @@ class System:
             instant: which one.
         """
         q, contacts = self._held(motion, instant)
-        return posture_of(self.robot, self.law, self.actuators, q, contacts=contacts)
+        return Rest.in_posture(self.robot, self.law, self.actuators, q, contacts=contacts)
 
     def frozen(
         self, motion: Motion | None = None, instant: int = 0, *, rest: Rest | None = None
@@ -188,7 +184,7 @@ class System:
             ContractionError: q̄(θ) is fed back and does not exist.
         """
         q, contacts = self._held(motion, instant)
-        return freeze(
+        return FrozenLoop.of(
             self.robot,
             self.law,
             self.actuators,

@@ -1,7 +1,7 @@
 """The whole-body law: tasks, signals, the controller that runs it, and its frozen loop."""
 
 from sealag.whole_body._controller import Controller
-from sealag.whole_body._frozen import FrozenLoop, freeze, sea_loop
+from sealag.whole_body._frozen import FrozenLoop, sea_loop
 from sealag.whole_body._law import Law
 from sealag.whole_body._links import FreeLinks, LinkPlant
 from sealag.whole_body._protocol import (
@@ -10,7 +10,7 @@ from sealag.whole_body._protocol import (
     TankController,
     TickController,
 )
-from sealag.whole_body._rest import Rest, posture_of, rest_of
+from sealag.whole_body._rest import Rest
 from sealag.whole_body._signals import (
     SIGNAL_NAMES,
     LinkAngles,
@@ -20,7 +20,7 @@ from sealag.whole_body._signals import (
     Tank,
     signal_named,
 )
-from sealag.whole_body._spaces import Spaces, relative_asymmetry, spaces_along
+from sealag.whole_body._spaces import Spaces, relative_asymmetry
 from sealag.whole_body._tank import TankFlow
 from sealag.whole_body._tasks import (
     GravityCompensation,
@@ -56,11 +56,7 @@ __all__ = [
     "TaskInertia",
     "TaskKind",
     "TickController",
-    "freeze",
-    "posture_of",
     "relative_asymmetry",
-    "rest_of",
     "sea_loop",
     "signal_named",
-    "spaces_along",
 ]

@@ -53,6 +53,66 @@ class FrozenLoop:
         """(N, N) the law's part, late by d."""
         return self.B @ self.C
 
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        law: Law,
+        actuators: Actuators,
+        posture: Array,
+        *,
+        contacts: tuple[Contact, ...],
+        rest: Rest,
+        embedded_delay: float | None = None,
+    ) -> "FrozenLoop":
+        """Freeze the closed loop of the law that runs, where it rests.
+
+        Links: Zᵀ M Z z̈ + Zᵀ D_j Z ż + H z = Sᵀ τ_sea with S = U Z,
+        τ_sea = K (θ − S z) + D_s (θ̇ − S ż), D_j the joints' own damping, and H as in
+        `LinkPlant.free`. Motors and drives: the rates of the kernel that simulates them. The
+        command: the derivative of what the controller ticks.
+
+        Args:
+            robot: the robot.
+            law: the law.
+            actuators: springs, motors and drives.
+            posture: (nq,) configuration that the law holds.
+            contacts: which frames are held.
+            rest: where the loop rests, from `Rest.of`.
+            embedded_delay: how late torque feedback is in the drives, s; None for without delay.
+
+        Returns:
+            The frozen loop.
+
+        Raises:
+            ContractionError: q̄(θ) is fed back and does not exist.
+        """
+        evaluation = LawEvaluation(
+            robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
+        )
+        command = law.signal.start(evaluation, delay_bound=0.0).derivative(rest.q, rest.theta)
+        links = LinkPlant(robot, contacts).free(rest.q, rest.tau_sea)
+        links, kept, C_z, B_z = _without_momentum(links, command)
+        memory = Memory(
+            A=command.A, B_z=B_z, B_theta=command.B_theta, B_rate=command.B_rate, C=command.C
+        )
+        S = links.Z[robot.nv_base :]
+        H, C_z, C_theta = _without_noise(
+            links.H, S, actuators.spring_stiffness, C_z=C_z, C_theta=command.C_theta, memory=memory
+        )
+        return sea_loop(
+            actuators,
+            M=links.M,
+            H=H,
+            S=S,
+            joint_damping=robot.damping,
+            C_z=C_z,
+            C_theta=C_theta,
+            memory=memory,
+            symmetries=kept,
+            embedded_delay=embedded_delay,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class _Places:
@@ -102,64 +162,6 @@ class _Places:
         rates = [f"d/dt {name}" for name in angles]
         torques = [f"drive:{joints[i]}" for i in drives]
         return (*angles, *rates, *torques, *(f"tank:{i}" for i in range(self.memory_size)))
-
-
-def freeze(
-    robot: Robot,
-    law: Law,
-    actuators: Actuators,
-    posture: Array,
-    *,
-    contacts: tuple[Contact, ...],
-    rest: Rest,
-    embedded_delay: float | None = None,
-) -> FrozenLoop:
-    """Freeze the closed loop of the law that runs, where it rests.
-
-    Links: Zᵀ M Z z̈ + Zᵀ D_j Z ż + H z = Sᵀ τ_sea with S = U Z, τ_sea = K (θ − S z) + D_s (θ̇ − S ż),
-    D_j the joints' own damping, and H as in `LinkPlant.free`. Motors and drives: the generator of
-    the kernel that simulates them. The command: the derivative of what the controller ticks.
-
-    Args:
-        robot: the robot.
-        law: the law.
-        actuators: springs, motors and drives.
-        posture: (nq,) configuration that the law holds.
-        contacts: which frames are held.
-        rest: where the loop rests, from `rest_of`.
-        embedded_delay: how late torque feedback is in the drives, s; None for without delay.
-
-    Returns:
-        The frozen loop.
-
-    Raises:
-        ContractionError: q̄(θ) is fed back and does not exist.
-    """
-    evaluation = LawEvaluation(
-        robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
-    )
-    command = law.signal.start(evaluation, delay_bound=0.0).derivative(rest.q, rest.theta)
-    links = LinkPlant(robot, contacts).free(rest.q, rest.tau_sea)
-    links, kept, C_z, B_z = _without_momentum(links, command)
-    memory = Memory(
-        A=command.A, B_z=B_z, B_theta=command.B_theta, B_rate=command.B_rate, C=command.C
-    )
-    S = links.Z[robot.nv_base :]
-    H, C_z, C_theta = _without_noise(
-        links.H, S, actuators.spring_stiffness, C_z=C_z, C_theta=command.C_theta, memory=memory
-    )
-    return sea_loop(
-        actuators,
-        M=links.M,
-        H=H,
-        S=S,
-        joint_damping=robot.damping,
-        C_z=C_z,
-        C_theta=C_theta,
-        memory=memory,
-        symmetries=kept,
-        embedded_delay=embedded_delay,
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -57,58 +57,60 @@ class Rest:
     moved: float
     reason: str
 
+    @classmethod
+    def in_posture(
+        cls,
+        robot: Robot,
+        law: Law,
+        actuators: Actuators,
+        posture: Array,
+        *,
+        contacts: tuple[Contact, ...],
+    ) -> "Rest":
+        """Return the loop's state in the posture: tasks without error, springs that carry gravity.
 
-def rest_of(
-    robot: Robot,
-    law: Law,
-    actuators: Actuators,
-    posture: Array,
-    *,
-    contacts: tuple[Contact, ...],
-) -> Rest:
-    """Find the equilibrium near a posture that the law holds.
+        It is where the loop rests if its references are corrected for the sag of a law that feeds
+        back motor angles, or if an operator has brought it there.
 
-    Uᵀ τ = g − J_sᵀ λ, τ = K (θ − q_j) = τ_osc(q, θ) with contacts where the posture has them, by
-    Newton's method with the derivative of the law that runs. A law that compensates gravity at the
-    static joint state rests at the posture; one that feeds back motor angles sags.
+        Args:
+            robot: the robot.
+            law: the law.
+            actuators: its springs.
+            posture: (nq,) configuration.
+            contacts: which frames are held.
 
-    Args:
-        robot: the robot.
-        law: the law.
-        actuators: its springs.
-        posture: (nq,) configuration that the law holds.
-        contacts: which frames are held.
+        Raises:
+            RobotError: the mass matrix is not positive definite.
+        """
+        return _Search(robot, law, actuators, posture, contacts).posture()
 
-    Raises:
-        RobotError: the mass matrix is not positive definite.
-    """
-    return _Search(robot, law, actuators, posture, contacts).run()
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        law: Law,
+        actuators: Actuators,
+        posture: Array,
+        *,
+        contacts: tuple[Contact, ...],
+    ) -> "Rest":
+        """Find the equilibrium near a posture that the law holds.
 
+        Uᵀ τ = g − J_sᵀ λ, τ = K (θ − q_j) = τ_osc(q, θ) with contacts where the posture has them,
+        by Newton's method with the derivative of the law that runs. A law that compensates gravity
+        at the static joint state rests at the posture; one that feeds back motor angles sags.
 
-def posture_of(
-    robot: Robot,
-    law: Law,
-    actuators: Actuators,
-    posture: Array,
-    *,
-    contacts: tuple[Contact, ...],
-) -> Rest:
-    """Return the loop's state in the posture: tasks without error, springs that carry gravity.
+        Args:
+            robot: the robot.
+            law: the law.
+            actuators: its springs.
+            posture: (nq,) configuration that the law holds.
+            contacts: which frames are held.
 
-    It is where the loop rests if its references are corrected for the sag of a law that feeds back
-    motor angles, or if an operator has brought it there.
-
-    Args:
-        robot: the robot.
-        law: the law.
-        actuators: its springs.
-        posture: (nq,) configuration.
-        contacts: which frames are held.
-
-    Raises:
-        RobotError: the mass matrix is not positive definite.
-    """
-    return _Search(robot, law, actuators, posture, contacts).posture()
+        Raises:
+            RobotError: the mass matrix is not positive definite.
+        """
+        return _Search(robot, law, actuators, posture, contacts).run()
 
 
 class _Search:

@@ -83,63 +83,63 @@ class Spaces:
         rows = slice(self.levels[index], self.levels[index + 1])
         return self.J_star[:, rows], self.Lambda[:, rows, rows], self.K_x[rows, rows]
 
+    @classmethod
+    def along(cls, robot: Robot, law: Law, actuators: Actuators, motion: Motion) -> "Spaces":
+        """Evaluate the law's matrices at every instant of a motion.
 
-def spaces_along(robot: Robot, law: Law, actuators: Actuators, motion: Motion) -> Spaces:
-    """Evaluate the law's matrices at every instant of a motion.
+        Args:
+            robot: the robot.
+            law: the law.
+            actuators: its springs.
+            motion: configurations and contacts.
 
-    Args:
-        robot: the robot.
-        law: the law.
-        actuators: its springs.
-        motion: configurations and contacts.
+        Returns:
+            Stacked matrices in the motion's order.
 
-    Returns:
-        Stacked matrices in the motion's order.
-
-    Raises:
-        RobotError: a mass matrix is not positive definite.
-        UnknownNameError: a frame or joint of a task or contact does not exist.
-    """
-    n, count = robot.n, len(motion)
-    levels = law.levels(robot)
-    m = levels[-1]
-    J_star, Lambda, S = (np.zeros((count, m, k)) for k in (n, m, m))
-    torque, F_gravity = np.zeros((count, n)), np.zeros((count, n, n))
-    singular = np.zeros(count, dtype=bool)
-    moved = J_star if law.task_error is TaskError.CONSISTENT else np.zeros_like(J_star)
-    for index, contacts in enumerate(motion.contact_sets):
-        where = np.flatnonzero(motion.contact_index == index)
-        if len(where) == 0:
-            continue
-        q = motion.q[where]
-        at = _spaces_at(robot, law, q, contacts=contacts)
-        J_star[where], Lambda[where], S[where], torque[where] = (
-            at.J_star, at.Lambda, at.stiffness, at.gravity,
-        )  # fmt: skip
-        singular[where] = _singular(robot, law, q, at, contacts=contacts, levels=levels)
-        if law.task_error is TaskError.PLAIN:
-            moved[where] = at.J_t @ at.along
-        if law.gravity is GravityCompensation.FEEDBACK:
-            F_gravity[where] = _gravity_gradient(robot, q, contacts, directions=at.along)
-    K = actuators.spring_stiffness
-    F_task = J_star.transpose(0, 2, 1) @ S @ moved
-    F_q = F_task - F_gravity
-    F_theta = law.signal.motor_stiffness(F_q, K)
-    return Spaces(
-        levels=tuple(levels),
-        K_x=law.gain(robot),
-        J_star=J_star,
-        Lambda=Lambda,
-        stiffness=S,
-        F_task=F_task,
-        F_gravity=F_gravity,
-        F_q=F_q,
-        F_theta=F_theta,
-        contraction=static_contraction(F_q, K),
-        asymmetry=relative_asymmetry(F_theta),
-        gravity=torque,
-        singular=singular,
-    )
+        Raises:
+            RobotError: a mass matrix is not positive definite.
+            UnknownNameError: a frame or joint of a task or contact does not exist.
+        """
+        n, count = robot.n, len(motion)
+        levels = law.levels(robot)
+        m = levels[-1]
+        J_star, Lambda, S = (np.zeros((count, m, k)) for k in (n, m, m))
+        torque, F_gravity = np.zeros((count, n)), np.zeros((count, n, n))
+        singular = np.zeros(count, dtype=bool)
+        moved = J_star if law.task_error is TaskError.CONSISTENT else np.zeros_like(J_star)
+        for index, contacts in enumerate(motion.contact_sets):
+            where = np.flatnonzero(motion.contact_index == index)
+            if len(where) == 0:
+                continue
+            q = motion.q[where]
+            at = _spaces_at(robot, law, q, contacts=contacts)
+            J_star[where], Lambda[where], S[where], torque[where] = (
+                at.J_star, at.Lambda, at.stiffness, at.gravity,
+            )  # fmt: skip
+            singular[where] = _singular(robot, law, q, at, contacts=contacts, levels=levels)
+            if law.task_error is TaskError.PLAIN:
+                moved[where] = at.J_t @ at.along
+            if law.gravity is GravityCompensation.FEEDBACK:
+                F_gravity[where] = _gravity_gradient(robot, q, contacts, directions=at.along)
+        K = actuators.spring_stiffness
+        F_task = J_star.transpose(0, 2, 1) @ S @ moved
+        F_q = F_task - F_gravity
+        F_theta = law.signal.motor_stiffness(F_q, K)
+        return Spaces(
+            levels=tuple(levels),
+            K_x=law.gain(robot),
+            J_star=J_star,
+            Lambda=Lambda,
+            stiffness=S,
+            F_task=F_task,
+            F_gravity=F_gravity,
+            F_q=F_q,
+            F_theta=F_theta,
+            contraction=static_contraction(F_q, K),
+            asymmetry=relative_asymmetry(F_theta),
+            gravity=torque,
+            singular=singular,
+        )
 
 
 def relative_asymmetry(F: Array) -> Array:
