@@ -18,6 +18,7 @@ from sealag.kernels.contact import (
 )
 from sealag.kernels.dynamics import KINETIC
 from sealag.kernels.friction import SETTLED, UNSOLVABLE
+from sealag.kernels.ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
 from sealag.kernels.linalg import copy
 from sealag.kernels.plant import GLIDE, MARGIN, SAME, STEP, STORE, accept, act, take_step
 from sealag.typing import Array, IntArray
@@ -81,11 +82,7 @@ class Log(NamedTuple):
     undelayed_work: Array  # (N, n)
 
 
-WHOLE = ("tick", "contact_mode")  # columns of the log that are whole numbers
-DIMENSIONS = {
-    **dict.fromkeys(("time", "tick", "moved", "storage", "tank"), 1), "contact_force": 3, "joint": 3
-}  # fmt: skip
-"""Of the log's arrays that do not have two."""
+_WHOLE = ("tick", "contact_mode")  # columns of the log that are whole numbers
 
 
 class Limits(NamedTuple):
@@ -191,11 +188,29 @@ class Course(NamedTuple):
     log: Log
 
 
+def log_shapes(nq: int, nv: int, n: int, *, points: int) -> dict[str, tuple[int, ...]]:
+    """Return the shape of one row of each array of a log."""
+    shapes = {
+        "time": (), "tick": (), "q": (nq,), "v": (nv,), "contact_force": (points, 3),
+        "contact_mode": (points,), "stores": (len(STORES),), "joint": (len(JOINT_FLOWS), n),
+        "scalar": (len(SCALAR_FLOWS),), "moved": (), "storage": (), "tank": (),
+    }  # fmt: skip
+    return {name: shapes.get(name, (n,)) for name in Log._fields}
+
+
+def allocate_log(rows: int, shapes: dict[str, tuple[int, ...]]) -> Log:
+    """Return an empty log of rows of given shapes."""
+    return Log(
+        **{
+            name: np.zeros((rows, *shape), np.int64 if name in _WHOLE else float)
+            for name, shape in shapes.items()
+        }
+    )
+
+
 def idle(n: int) -> Course:
     """Return the course of a plant of n joints that is in no run."""
-    empty, log = np.zeros(0), {}
-    for name in Log._fields:
-        log[name] = np.zeros((0,) * DIMENSIONS.get(name, 2), np.int64 if name in WHOLE else float)
+    log, empty = allocate_log(0, log_shapes(0, 0, n, points=0)), np.zeros(0)
     none, one = np.zeros(0, np.int64), np.zeros(1)
     channels = Channels(
         due=empty, kind=none, tick=none, samples=np.zeros((1, 1)), commands=np.zeros((1, n)),
@@ -204,7 +219,7 @@ def idle(n: int) -> Course:
     )  # fmt: skip
     periods = Periods(step=1.0, steps=0, log=1, watch=1, torque=1, torque_period=1.0)
     limits = Limits(deflection=1.0, speed=1.0, height=-1.0, tilt=-1.0, up=np.zeros((1, 3)))
-    return Course(channels, periods, limits, Log(**log))
+    return Course(channels, periods, limits, log)
 
 
 class Cursor(NamedTuple):

@@ -12,7 +12,7 @@ from sealag.kernels import keep
 from sealag.robot import Robot
 from sealag.simulation._audit import Stated, UndelayedWork, audit
 from sealag.simulation._exchange import Exchanges
-from sealag.simulation._memory import allocate_log, events_of, open_channels
+from sealag.simulation._memory import empty_log, events_of, open_channels
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.simulation._plant import FASTEST, Plant
@@ -187,7 +187,7 @@ class _Loop:
         """Lay out all that happens: loads, samples, ticks and takings, and what is logged."""
         kernel, step = self._kernel, self.clock.physics
         self.plant.held.command[:], self.plant.held.known_torque[:] = self.first, 0.0
-        self._log = allocate_log(self.plant, -(-steps // every) + 1)  # too long a run ends here
+        self._log = empty_log(self.plant, -(-steps // every) + 1)  # too long a run ends here
         ways = Exchanges.plan(self._network, self.clock, duration=steps * step, seed=self.seed)
         self.exchanges = ways
         self._periods = kernel.Periods(

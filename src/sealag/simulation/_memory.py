@@ -86,7 +86,7 @@ def open_channels(
     )
 
 
-def allocate_log(plant: Plant, rows: int) -> "Log":
+def empty_log(plant: Plant, rows: int) -> "Log":
     """Allocate the log of a run; NaN is the time of a row that is not written yet.
 
     Args:
@@ -96,20 +96,11 @@ def allocate_log(plant: Plant, rows: int) -> "Log":
     Raises:
         InputError: It would not fit into memory.
     """
-    from sealag.kernels.run import WHOLE, Log
+    from sealag.kernels.run import allocate_log, log_shapes
 
-    robot, points, ledger = plant.robot, plant.surroundings.count, plant.ledger
-    shapes = {
-        "time": (), "tick": (), "q": (robot.nq,), "v": (robot.nv,),
-        "contact_force": (points, 3), "contact_mode": (points,),
-        "stores": ledger.stores.shape, "joint": ledger.joint.shape,
-        "scalar": ledger.scalar.shape, "moved": (), "storage": (), "tank": (),
-    }  # fmt: skip
-    log = {name: shapes.get(name, (robot.n,)) for name in Log._fields}
-    refuse_large(rows, sum(math.prod(shape) for shape in log.values()))
-    arrays = {
-        name: np.zeros((rows, *shape), np.int64 if name in WHOLE else float)
-        for name, shape in log.items()
-    }
-    arrays["time"][:] = np.nan
-    return Log(**arrays)
+    robot = plant.robot
+    shapes = log_shapes(robot.nq, robot.nv, robot.n, points=plant.surroundings.count)
+    refuse_large(rows, sum(math.prod(shape) for shape in shapes.values()))
+    log = allocate_log(rows, shapes)
+    log.time[:] = np.nan
+    return log
