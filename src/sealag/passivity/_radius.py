@@ -36,7 +36,7 @@ def bracket(A: Array, error: Array, *, tolerance: float) -> Bracket:
         raise InputError("The scaled stiffness overflows; check the units of K_x and D_theta.")
     shape, n = A.shape[:-2], A.shape[-1]
     flat = np.ascontiguousarray(A).reshape(-1, n, n)
-    spread = np.ascontiguousarray(np.broadcast_to(error, shape)).reshape(-1)
+    spread = np.array(np.broadcast_to(error, shape), dtype=float).reshape(-1)
     lower, upper, angle = (np.empty(len(flat)) for _ in range(3))
     numerical_radii(flat, spread, 0.5 * tolerance, lower, upper, angle)
     with np.errstate(divide="ignore"):
