@@ -347,9 +347,10 @@ def test_command_against_its_plain_twin(hume):
         robot, q, v, springs=springs, tau=tau.copy(), smooth=smooth.copy(), rates=rates.copy(),
         tau_sea=sea.copy(),
     )  # fmt: skip
-    carry(biped, command)
+    carry(biped, False, command)
     smooth = biped.smooth
     np.testing.assert_allclose(command, plain)
     np.testing.assert_allclose(smooth, average)
-    carry(biped._replace(lead=LEAD._replace(time=0.0, forward=0.0, feedback=0.0)), command)
+    plain_lead = LEAD._replace(time=0.0, forward=0.0, feedback=0.0)
+    carry(biped._replace(lead=plain_lead), False, command)
     np.testing.assert_allclose(command, clipped)

@@ -375,8 +375,7 @@ def write_measurement(at, contacts, t, row):
     """
     row[0], place = t, 1
     for part in (at.q, at.v, at.theta, at.theta_dot, at.tau_sea):
-        for i in range(part.size):
-            row[place + i] = part[i]
+        copy(part, row[place : place + part.size])
         place += part.size
     row[place:] = 0.0
     for i in range(contacts.closed.size):

@@ -137,8 +137,7 @@ def tick(control, signal, period, q, angles, out):
 def _tick(control, signal, period, q, angles, out):
     at = control.at
     # One evaluation serves all signals: what is inlined once is compiled once.
-    wanted = 1 if signal.kind == MEASURED else signal.iterations
-    status, settled, k = EXISTS, False, 0
+    settled, steps = False, 0
     while True:
         for i in range(angles.size):
             at.joints[i] = angles[i]
@@ -148,11 +147,11 @@ def _tick(control, signal, period, q, angles, out):
             return SINGULAR_MASS
         if signal.kind == MEASURED or settled:
             break
-        k += 1
+        steps += 1
         status, settled = approach_static_state(control, signal, out)
         if status != EXISTS:
             return status
-        settled = settled or k >= wanted
+        settled = settled or steps >= signal.iterations
         if settled:
             _end_search(control, signal, out)
             for r in range(at.error.size):

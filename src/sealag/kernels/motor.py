@@ -369,8 +369,9 @@ def predict(motors, j, held, rotor, link, step, series):
     drive, _, rotor = choose(motors, j, held, rotor, link)
     reach = _fastest(motors, j, held.instant, drive.limited) * step
     if reach <= _REACH:
-        whole = _expand(motors, j, held.instant, drive, rotor, link, step, _order(reach), series)
-        return _half(series, rotor, step, _order(reach)), whole
+        order = _order(reach)
+        whole = _expand(motors, j, held.instant, drive, rotor, link, step, order, series)
+        return _half(series, rotor, step, order), whole
     half, _ = travel(motors, j, held.instant, drive, rotor, link, 0.5 * step, series, False)
     link = link_at(link, 0.5 * step)
     whole, _ = travel(motors, j, held.instant, drive, half, link, 0.5 * step, series, False)

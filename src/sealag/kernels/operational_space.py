@@ -99,8 +99,8 @@ def allocate(nv: int, n: int, c: int, *, m: int) -> Space:
         phi_inverse=np.zeros((n, n)), phi_copy=np.zeros((n, n)), scratch_n=np.zeros((5, n * n)),
         contact_mobility=np.zeros((c, c)), contact_inertia=np.zeros((c, c)),
         scratch_c=np.zeros((5, c * c)), square_m=np.zeros((5, m * m)),
-        scratch_m=np.zeros((5, m * m)),        moved_c=np.zeros((c, nv)),
-        wide_c=np.zeros((c, nv)), wide_m=np.zeros((m, nv)), low_m=np.zeros((m, n)),
+        scratch_m=np.zeros((5, m * m)), moved_c=np.zeros((c, nv)), wide_c=np.zeros((c, nv)),
+        wide_m=np.zeros((m, nv)), low_m=np.zeros((m, n)),
         tall_n=np.zeros((nv, n)), values=np.zeros(max(n, c, m, 1)),
     )  # fmt: skip
 
@@ -160,9 +160,9 @@ def _inertia(H, threshold, needs_root, Lambda, root, scratch, space):
 
 
 @inner
-def _stiffness_block(form, K, Lambda, root, scratch, out):
+def _stiffness_block(form, needs_root, K, Lambda, root, scratch, out):
     """The task stiffness of one level: Λ^½ K Λ^½, which is Λ K for a scalar K; Λ K; or K."""
-    if form == SYMMETRIC and not _is_scalar(K):
+    if needs_root:
         multiply(K, root, scratch)
         multiply(root, scratch, out)
     elif form == FORCE:
@@ -274,7 +274,7 @@ def _level(J_t, K_x, first, last, form, star, tolerance, space):
     for i in range(size):
         for j in range(size):
             vectors[i, j] = K[i, j]
-    _stiffness_block(form, vectors, Lambda, root, H, block)
+    _stiffness_block(form, needs_root, vectors, Lambda, root, H, block)
     for i in range(size):
         for j in range(size):
             space.stiffness[first + i, first + j] = block[i, j]

@@ -243,11 +243,7 @@ def command(kept, raw_reference, first, out):
 def _command(biped, wish, first, out):
     if not law(biped, wish):
         return False
-    if first:
-        for j in range(out.size):
-            limit = biped.springs.limit[j]
-            biped.smooth[j] = min(max(biped.tau[j], -limit), limit)
-    carry(biped, out)
+    carry(biped, first, out)
     return True
 
 
@@ -272,8 +268,8 @@ def law(biped, wish):
     bend = 0.0 if wish.still else terms.com_drift[2]
     if wish.still:
         bias[:] = 0.0
+    weight = terms.bodies.mass[0] * GRAVITY
     for c in range(nv):
-        weight = terms.bodies.mass[0] * GRAVITY
         h[c] = weight * terms.com_jacobian[2, c] if wish.still else terms.nle[c]
     heading, other, wanted, velocity = scratch.heading, 1 - stance, scratch.wanted, scratch.velocity
     roll, pitch, (turn_x, turn_y, turn_z) = _posture(rotation(terms.rotation, 1), v, heading)
@@ -345,17 +341,20 @@ def _support(biped, rows, bend, stance, tau):
 
 
 @inner
-def carry(biped, command):
+def carry(biped, first, command):
     """Write the command that makes springs and motors carry the task torque within its limits.
 
     Args:
         biped: tau is clipped, smooth is moved; planned rates and predicted spring torques are read.
+        first: whether smooth begins at tau.
         command: (n,) written, Nm.
     """
     lead, springs, tau, smooth = biped.lead, biped.springs, biped.tau, biped.smooth
     for j in range(tau.size):
         tau[j] = min(max(tau[j], -springs.limit[j]), springs.limit[j])
         command[j] = tau[j]
+        if first:
+            smooth[j] = tau[j]
         if lead.time > 0.0:
             smooth[j] = tau[j] + lead.keep * (smooth[j] - tau[j])
             command[j] = smooth[j] + springs.lag[j] * ((tau[j] - smooth[j]) / lead.time)

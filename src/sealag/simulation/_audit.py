@@ -174,8 +174,7 @@ class UndelayedWork:
             self.work += gained
             self._done = float(gained.sum())
         if len(self._last) == 2:
-            (first, command), (last, now) = self._last[0], here
-            both = 0.5 * float((command + now) @ (last - first))
+            both = float(_trapezoid(self._last[0], here).sum())
             self.rough += 0.5 * abs(both - before - self._done)
         self._last = [*self._last[-1:], here]
 

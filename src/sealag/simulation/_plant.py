@@ -173,7 +173,7 @@ class Plant:
 
     # Motion ------------------------------------------------------------------------------------
     def glide(self, course: Any, cursor: "Cursor", said: float) -> "tuple[int, float, Cursor]":
-        """Go on with a run until something needs Python, see `kernels.run.glide`.
+        """Go on with a run until something needs Python, see `kernels.run.move`.
 
         Args:
             course: The run, as kernels take it.
