@@ -13,6 +13,7 @@ import pytest
 import sealag
 from sealag.cli import main
 from sealag.design import certified_bounds, load, local_margins, margin_of
+from sealag.errors import SolverError
 from sealag.simulation import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -164,12 +165,20 @@ def test_a_lost_direction_is_refused_and_bounded_beside_it():
     assert certificate.answer.status == "not_certified"
     assert "lose a direction" in certificate.answer.reasons[0]
     assert system.spaces().singular.all()
+    answer = certificate.answer
+    assert (answer.stable, answer.local_margin_s) == (None, None)
+    said = [one.text for one in answer.assumptions if one.key == "critical_instant"]
+    assert "differs by 42.1%" in said[0]
+    with pytest.raises(SolverError, match="no margin holds"):
+        local_margins(system)
     for angle in (0.001, 0.01):
         bent = system.posture.copy()
         bent[1] += angle
         beside = replace(system, posture=bent)
         assert not beside.spaces().singular.any()
-        assert sealag.certify(beside).answer.max_delay_s == pytest.approx(51.43e-3, abs=1e-5)
+        answer = sealag.certify(beside).answer
+        assert answer.max_delay_s == pytest.approx(51.43e-3, abs=1e-5)
+        assert answer.stable is True
 
 
 def test_the_loop_rests_elsewhere_with_another_margin():

@@ -24,6 +24,14 @@ less loses postures of stiff contacts; ten times more takes sagging ones for equ
 _DRIFT = 1e-9
 """1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
 
+_BESIDE = 1e-3
+"""rad: distance over which a law is differentiated once more in a singular posture. Over 3e-5 rad it
+does without the direction that it lost; a robot moves further than that."""
+
+_BEND = 1e-4
+"""Share of a law's derivative that may change over `_BESIDE`: smooth laws stay 1e-6 apart, bent ones
+1e-2."""
+
 _MOST_DRIFTING = 8  # zero roots that are counted
 
 _MINIMUM = 1e-9
@@ -278,9 +286,18 @@ class _Decision:
     def _at(self, k: int, at: Place, state: Rest) -> "_Known":
         """The loop of an instant, frozen at a state, and its margin."""
         loop, margin, problem = None, None, state.reason
+        singular = bool(self._spaces.singular[k]) and np.allclose(state.q, self._motion.q[k])
         try:
-            loop = self._system.frozen(self._motion, k, rest=state)
-            margin = margin_of(loop)
+            loop = self._system.frozen(
+                self._motion, k, rest=state, beside=_BESIDE if singular else None
+            )
+            if loop.bend > _BEND:
+                problem = problem or (
+                    "a task or contact loses a direction in this posture, and the law's stiffness "
+                    f"beside it differs by {loop.bend:.1%}, so that no margin holds; choose another posture"
+                )
+            else:
+                margin = margin_of(loop)
         except (ContractionError, SolverError) as error:
             problem = problem or str(error)
         return _Known(margin=margin, loop=loop, at=at, rest=state, problem=problem)

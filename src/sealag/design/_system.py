@@ -171,7 +171,12 @@ class System:
         return Rest.in_posture(self.robot, self.law, self.actuators, q, contacts=contacts)
 
     def frozen(
-        self, motion: Motion | None = None, instant: int = 0, *, rest: Rest | None = None
+        self,
+        motion: Motion | None = None,
+        instant: int = 0,
+        *,
+        rest: Rest | None = None,
+        beside: float | None = None,
     ) -> FrozenLoop:
         """Return the closed loop of the law that runs, where it rests.
 
@@ -179,6 +184,7 @@ class System:
             motion: its instants; the posture if None.
             instant: which one.
             rest: where the loop rests, if that is known already.
+            beside: see `FrozenLoop.of`.
 
         Raises:
             ContractionError: q̄(θ) is fed back and does not exist.
@@ -192,6 +198,7 @@ class System:
             contacts=contacts,
             rest=self.rest(motion, instant) if rest is None else rest,
             embedded_delay=self.delays.torque_feedback_delay,
+            beside=beside,
         )
 
     @property

@@ -38,6 +38,7 @@ class FrozenLoop:
         states: names of the states.
         symmetries: (N, s) states along which nothing acts, because gravity, contacts and the law do
             not change: yaw about a point foot, translation of a free robot, unless a task feels it.
+        bend: share of the law's derivative that changes within the distance asked for, `beside`.
     """
 
     A_0: Array
@@ -47,6 +48,7 @@ class FrozenLoop:
     embedded_delay: float
     states: tuple[str, ...]
     symmetries: Array
+    bend: float = 0.0
 
     @property
     def A_1(self) -> Array:
@@ -64,6 +66,7 @@ class FrozenLoop:
         contacts: tuple[Contact, ...],
         rest: Rest,
         embedded_delay: float | None = None,
+        beside: float | None = None,
     ) -> "FrozenLoop":
         """Freeze the closed loop of the law that runs, where it rests.
 
@@ -80,6 +83,8 @@ class FrozenLoop:
             contacts: which frames are held.
             rest: where the loop rests, from `Rest.of`.
             embedded_delay: how late torque feedback is in the drives, s; None for without delay.
+            beside: also differentiate the law over this distance, rad, and say in `bend` what
+                changes: in a singular posture a law may have no derivative that holds beside it.
 
         Returns:
             The frozen loop.
@@ -90,7 +95,11 @@ class FrozenLoop:
         evaluation = LawEvaluation(
             robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
         )
-        command = law.signal.start(evaluation, delay_bound=0.0).derivative(rest.q, rest.theta)
+        signal = law.signal.start(evaluation, delay_bound=0.0)
+        command = signal.derivative(rest.q, rest.theta)
+        bend = 0.0
+        if beside is not None:
+            bend = command.change(signal.derivative(rest.q, rest.theta, beside))
         links = LinkPlant(robot, contacts).free(rest.q, rest.tau_sea)
         links, kept, C_z, B_z = _without_momentum(links, command)
         memory = Memory(
@@ -100,7 +109,7 @@ class FrozenLoop:
         H, C_z, C_theta = _without_noise(
             links.H, S, actuators.spring_stiffness, C_z=C_z, C_theta=command.C_theta, memory=memory
         )
-        return sea_loop(
+        loop = sea_loop(
             actuators,
             M=links.M,
             H=H,
@@ -112,6 +121,7 @@ class FrozenLoop:
             symmetries=kept,
             embedded_delay=embedded_delay,
         )
+        return replace(loop, bend=bend)
 
 
 @dataclass(frozen=True, slots=True)

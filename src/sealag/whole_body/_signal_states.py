@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _SETTLE = 60
 """Newton iterations for q̄(θ) of a state that does not move; a handful is enough where it exists."""
 
-_STEP = 2e-5
+STEP = 2e-5
 """rad, m: half the base of central differences of the command, extrapolated with those of half the
 base. Near singular postures, where the law bends within 1e-3 rad, plain differences of 1e-5 rad
 leave 1e-5 of the derivative; these leave 5e-9, of which half is rounding."""
@@ -73,6 +73,17 @@ class LawDerivative:
         )  # fmt: skip
 
 
+    def change(self, other: "LawDerivative") -> float:
+        """Return how far another derivative of the same law lies from this one, as a share of it.
+
+        Args:
+            other: the other one.
+        """
+        mine = np.hstack([self.C_q, self.C_theta, self.C])
+        theirs = np.hstack([other.C_q, other.C_theta, other.C])
+        return float(np.linalg.norm(theirs - mine) / max(np.linalg.norm(mine), 1e-300))
+
+
 class SignalState(Protocol):
     """A signal that runs: it moves the law from tick to tick."""
 
@@ -122,12 +133,13 @@ class SignalState(Protocol):
         """
         ...
 
-    def derivative(self, q: Array, theta: Array) -> LawDerivative:
+    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
         """Return the derivative of what runs, about a state that does not move.
 
         Args:
             q: (nq,) configuration.
             theta: (n,) motor angles, rad.
+            width: half the base of the central differences, rad and m.
         """
         ...
 
@@ -175,27 +187,29 @@ class MeasuredAngles:
         law.follow(q)
         law.settled(lambda: law.at(q, joints, out), lambda: away)
 
-    def derivative(self, q: Array, theta: Array) -> LawDerivative:
+    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
         """Differentiate the settled command."""
-        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta))
+        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta, width))
 
 
-def _differences(law: "LawEvaluation", function, q: Array, theta: Array, rows: int = 0):
+def _differences(
+    law: "LawEvaluation", function, q: Array, theta: Array, width: float, *, rows: int = 0
+):
     """∂f/∂q (k, nv) and ∂f/∂θ (k, n) of function(q, θ, out), by central differences extrapolated to
     none: (4 D(h/2) − D(h)) / 3."""
     robot = law.robot
     k = rows or robot.n
     ahead, behind = np.zeros(k), np.zeros(k)
     by_q, by_theta = np.zeros((k, robot.nv)), np.zeros((k, robot.n))
-    for width, share in ((_STEP / 2.0, 4.0 / 3.0), (_STEP, -1.0 / 3.0)):
-        for i, step in enumerate(width * np.eye(robot.nv)):
+    for h, share in ((width / 2.0, 4.0 / 3.0), (width, -1.0 / 3.0)):
+        for i, step in enumerate(h * np.eye(robot.nv)):
             function(robot.integrate(q, step), theta, ahead)
             function(robot.integrate(q, -step), theta, behind)
-            by_q[:, i] += share * (ahead - behind) / (2.0 * width)
-        for i, step in enumerate(width * np.eye(robot.n)):
+            by_q[:, i] += share * (ahead - behind) / (2.0 * h)
+        for i, step in enumerate(h * np.eye(robot.n)):
             function(q, theta + step, ahead)
             function(q, theta - step, behind)
-            by_theta[:, i] += share * (ahead - behind) / (2.0 * width)
+            by_theta[:, i] += share * (ahead - behind) / (2.0 * h)
     return by_q, by_theta
 
 
@@ -243,9 +257,9 @@ class StaticState:
         law.follow(q)
         law.settled(lambda: law.static(q, theta, sag, _SETTLE, out), lambda: theta + sag - joints)
 
-    def derivative(self, q: Array, theta: Array) -> LawDerivative:
+    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
         """Differentiate the settled command."""
-        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta))
+        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta, width))
 
 
 class TankState:
@@ -313,7 +327,7 @@ class TankState:
         law.error[:] = law.wanted - position
         law.torque(out)
 
-    def derivative(self, q: Array, theta: Array) -> LawDerivative:
+    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
         """Return x̂̇ = J* θ̇ + rate (x(q̄) − x̂) while the tank can pay, and x̂ = J* θ while it cannot.
 
         What the tank holds changes with the square of the motion, so that near a rest it pays for
@@ -322,12 +336,14 @@ class TankState:
         law, m = self._law, self._law.rows
         target, command = np.zeros(m), np.zeros(law.robot.n)
         self._target(q, theta, target)
-        C_q, C_theta = _differences(law, lambda a, b, out: self._at(a, b, target, out), q, theta)
+        C_q, C_theta = _differences(
+            law, lambda a, b, out: self._at(a, b, target, out), q, theta, width
+        )
         self._at(q, theta, target, command)
         J, C = law.space.J_star.copy(), -law.space.J_star.T @ law.space.stiffness
         if not self._tank.can_pay:
             return LawDerivative.memoryless(C_q, C_theta + C @ J)
-        T_q, T_theta = _differences(law, self._target, q, theta, m)
+        T_q, T_theta = _differences(law, self._target, q, theta, width, rows=m)
         rate = self._tank.rate
         return LawDerivative(
             A=-rate * np.eye(m), B_q=rate * T_q, B_theta=rate * T_theta, B_rate=J, C=C,
