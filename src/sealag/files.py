@@ -1,14 +1,25 @@
 """Files: read with a size limit, written under a temporary name and then renamed."""
 
+import errno
+import fcntl
+import hashlib
+import io
+import itertools
 import os
 import stat
-import tempfile
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Self
 
 from sealag.errors import FileError
+
+_PATIENCE = 10.0  # s that a file that is written at once waits for another writer of it
+_POLL = 0.05  # s
+_LONGEST_NAME = 200  # bytes; file systems allow 255
+_NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
+"""How file systems without hard links answer."""
 
 
 def read_whole(path: Path, *, what: str, largest: int) -> bytes:
@@ -48,17 +59,22 @@ def check_output(path: Path, *inputs: Path) -> None:
         inputs: files that the command reads.
 
     Raises:
-        FileError: it is one of the inputs, or exists and is not a regular file.
+        FileError: it is one of the inputs, exists and is not a regular file, or cannot be a file.
     """
-    if not path.exists():
-        return
-    if not path.is_file():
-        raise FileError(
-            f"{path} is not a regular file and is not overwritten; choose another --out."
-        )
-    for other in inputs:
-        if other.exists() and path.samefile(other):
-            raise FileError(f"{path} is an input and is not overwritten; choose another --out.")
+    try:
+        if not path.exists():
+            return
+        if not path.is_file():
+            raise FileError(
+                f"{path} is not a regular file and is not overwritten; choose another --out."
+            )
+        taken = any(other.exists() and path.samefile(other) for other in inputs)
+    except OSError as error:
+        if isinstance(error, FileError):
+            raise
+        raise _unwritable(path, error) from error
+    if taken:
+        raise FileError(f"{path} is an input and is not overwritten; choose another --out.")
 
 
 def make_folder(path: Path) -> None:
@@ -76,50 +92,204 @@ def make_folder(path: Path) -> None:
         raise FileError(f"The folder {path} cannot be made: {error.strerror or error}.") from error
 
 
+def _unwritable(path: Path, error: OSError) -> FileError:
+    return FileError(f"{path} cannot be written: {error.strerror or error}.")
+
+
+class Draft:
+    """A file under way, hidden beside its target, which stays as it is until `keep`.
+
+    Its name is the target's with a dot before and `.sealag-draft` behind. A lock on it shows that
+    its writer lives: a second writer is refused; what a killed one left is taken over. A target
+    that is a link stays one, and keeps its mode; a new file has the process's umask.
+
+    Use it as a context manager: what is not kept is dropped.
+
+    Args:
+        path: where the file goes; the folder is made if needed.
+        patience: how long to wait for another writer, s.
+
+    Attributes:
+        asked: where it goes.
+        path: the same, links followed.
+        file: opened for writing, unbuffered.
+
+    Raises:
+        FileError: it cannot be written, or somebody else is writing it.
+    """
+
+    def __init__(self, path: Path, *, patience: float = 0.0) -> None:
+        self.asked = path
+        try:
+            self.path = Path(os.path.realpath(path))
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._name = self.path.with_name(_hidden(self.path.name))
+            last = time.monotonic() + patience
+            while True:
+                try:
+                    self.file = open(self._name, "wb", buffering=0, opener=_claimed)  # noqa: SIM115
+                    break
+                except BlockingIOError:
+                    if time.monotonic() >= last:
+                        raise FileError(
+                            f"{path} is being written by another process; wait for it, or choose "
+                            "another --out."
+                        ) from None
+                    time.sleep(_POLL)
+        except OSError as error:
+            if isinstance(error, FileError):
+                raise
+            raise _unwritable(path, error) from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.drop()
+
+    def keep(self, *, replace: bool = True) -> None:
+        """Give the file its name; what had it before is gone.
+
+        Args:
+            replace: False to refuse where a file of this name is there already.
+
+        Raises:
+            FileError: it cannot be renamed, or the name is taken.
+        """
+        try:
+            os.fsync(self.file.fileno())
+            if replace:
+                if self.path.is_file():
+                    os.fchmod(self.file.fileno(), stat.S_IMODE(self.path.stat().st_mode))
+                os.replace(self._name, self.path)
+            else:
+                _name_new(self._name, self.path)
+        except FileExistsError as error:
+            raise FileError(
+                f"{self.asked} exists already; choose another name with --out."
+            ) from error
+        except OSError as error:
+            raise _unwritable(self.asked, error) from error
+        self.drop()
+
+    def keep_beside(self, word: str) -> Path:
+        """Give the file its name if nothing has it, else one with a word and a number in it.
+
+        Args:
+            word: what stands before the ending, such as "incomplete".
+
+        Returns:
+            Its name.
+
+        Raises:
+            FileError: it cannot be named.
+        """
+        target = self.asked
+        for number in itertools.count(1):
+            try:
+                _name_new(self._name, Path(os.path.realpath(target)))
+                break
+            except FileExistsError:
+                suffix = f".{word}{f'-{number}' if number > 1 else ''}{self.asked.suffix}"
+                target = self.asked.with_suffix(suffix)
+            except OSError as error:
+                raise _unwritable(target, error) from error
+        self.drop()
+        return target
+
+    def drop(self) -> None:
+        """Leave nothing of the draft: of one that is kept, its hidden name is gone already."""
+        if not self.file.closed:
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(self.file.fileno()), os.lstat(self._name)):
+                    os.unlink(self._name)
+            self.file.close()
+
+
+def _hidden(name: str) -> str:
+    """The draft's name; a short one where the file system would refuse it."""
+    if len(os.fsencode(name)) > _LONGEST_NAME:
+        name = hashlib.sha256(os.fsencode(name)).hexdigest()[:32]
+    return f".{name}.sealag-draft"
+
+
+def _claimed(name: str, _flags: int) -> int:
+    """Open a draft, locked and empty.
+
+    Raises:
+        BlockingIOError: its writer lives.
+    """
+    while True:
+        handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            with suppress(FileNotFoundError):
+                # Meanwhile its writer may have renamed it, and the name is of another file.
+                if os.path.samestat(os.fstat(handle), os.lstat(name)):
+                    os.ftruncate(handle, 0)
+                    return handle
+        except BaseException:
+            os.close(handle)
+            raise
+        os.close(handle)
+
+
+def _name_new(draft: Path, target: Path) -> None:
+    """Give a draft a name that nothing has; FileExistsError if something has."""
+    try:
+        os.link(draft, target)
+    except OSError as error:
+        if error.errno not in _NO_LINKS:
+            raise
+        if os.path.lexists(target):
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from error
+        os.rename(draft, target)
+
+
 @contextmanager
-def written_whole(path: Path) -> Iterator[BinaryIO]:
+def written_whole(path: Path | Draft, *, replace: bool = True) -> Iterator[BinaryIO]:
     """Open a file for writing; it gets its name when it is complete.
 
     Args:
-        path: where it goes; the folder is made if needed. What was there before stays until the
-            new file is complete.
+        path: where it goes, or a draft of it; the folder is made if needed. What was there before
+            stays until the new file is complete.
+        replace: False to refuse where a file of this name is there already.
 
     Yields:
         A binary file.
 
     Raises:
-        FileError: it cannot be written.
+        FileError: it cannot be written, or somebody else is writing it.
     """
-    name = ""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
+    with path if isinstance(path, Draft) else Draft(path, patience=_PATIENCE) as draft:
+        try:
+            file = io.BufferedWriter(draft.file)
             yield file
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
-    finally:
-        if name and os.path.exists(name):
-            os.unlink(name)
+            file.flush()
+        except OSError as error:
+            if isinstance(error, FileError):
+                raise
+            raise _unwritable(draft.asked, error) from error
+        draft.keep(replace=replace)
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path | Draft, text: str, *, replace: bool = True) -> None:
     """Write a text file whole, as UTF-8.
 
     Args:
-        path: where it goes.
+        path: where it goes, or a draft of it.
         text: what it holds.
+        replace: False to refuse where a file of this name is there already.
 
     Raises:
         FileError: it cannot be written.
     """
-    with written_whole(path) as file:
+    with written_whole(path, replace=replace) as file:
         file.write(text.encode("utf-8"))
 
 
 __all__ = [
+    "Draft",
     "check_output",
     "make_folder",
     "read_whole",

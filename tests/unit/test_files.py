@@ -1,12 +1,16 @@
 """Files appear whole or not at all."""
 
+import multiprocessing
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from sealag.errors import FileError
-from sealag.files import check_output, read_whole, write_text, written_whole
+from sealag.files import Draft, check_output, read_whole, write_text, written_whole
 
 
 def test_a_failure_leaves_what_was_there(tmp_path):
@@ -49,3 +53,125 @@ def test_reading_is_bounded(tmp_path):
         read_whole(path, what="The file", largest=3)
     with pytest.raises(FileError, match="regular"):
         read_whole(Path("/dev/zero"), what="The file", largest=3)
+
+
+# Drafts ----------------------------------------------------------------------------------------
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from sealag.files import Draft
+draft = Draft(Path(sys.argv[1]))
+draft.file.write(b"half")
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_second_writer_is_refused_while_the_first_lives(tmp_path):
+    path = tmp_path / "a.txt"
+    with Draft(path) as first:
+        first.file.write(b"first")
+        with pytest.raises(FileError, match=r"a\.txt is being written by another process"):
+            Draft(path)
+        Draft(tmp_path / "b.txt").drop()
+        first.keep()
+    assert path.read_bytes() == b"first"
+    with Draft(path) as second:
+        second.file.write(b"second")
+        second.keep()
+    assert path.read_bytes() == b"second"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_what_a_killed_writer_left_is_swept(tmp_path):
+    path = tmp_path / "a.txt"
+    killed = subprocess.run([sys.executable, "-c", KILLED, str(path)])
+    assert killed.returncode == -signal.SIGKILL
+    assert os.listdir(tmp_path) == [".a.txt.sealag-draft"]
+    write_text(path, "new")
+    assert path.read_text() == "new"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def _write_often(path, text):
+    for _ in range(30):
+        write_text(path, text)
+
+
+def test_many_writers_at_once_leave_one_whole_file(tmp_path):
+    path, texts = tmp_path / "a.txt", [letter * 100_000 for letter in "abc"]
+    writers = [
+        multiprocessing.get_context("spawn").Process(target=_write_often, args=(path, text))
+        for text in texts
+    ]
+    for writer in writers:
+        writer.start()
+    seen = set()
+    while any(writer.is_alive() for writer in writers):
+        if path.exists():
+            seen.add(path.read_text())
+    assert [writer.exitcode for writer in writers] == [0, 0, 0]
+    assert seen and seen <= set(texts)
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_links_modes_and_the_umask_are_respected(tmp_path):
+    target, link = tmp_path / "there" / "a.txt", tmp_path / "a.txt"
+    write_text(target, "old")
+    assert target.stat().st_mode & 0o777 == 0o666 & ~_umask()
+    target.chmod(0o600)
+    link.symlink_to(target)
+    write_text(link, "new")
+    assert link.is_symlink() and target.read_text() == "new"
+    assert target.stat().st_mode & 0o777 == 0o600
+    before = os.umask(0o027)
+    try:
+        write_text(tmp_path / "b.txt", "x")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "b.txt").stat().st_mode & 0o777 == 0o640
+
+
+def _umask():
+    before = os.umask(0)
+    os.umask(before)
+    return before
+
+
+def test_files_of_the_user_with_names_like_drafts_stay(tmp_path):
+    others = [tmp_path / name for name in ("a.txt.partial", "a.txt.reserve", ".a.txt.tmp", "a~")]
+    for other in others:
+        other.write_text("mine")
+    precious = tmp_path / "precious"
+    precious.write_text("mine")
+    write_text(tmp_path / "a.txt", "x")
+    assert all(other.read_text() == "mine" for other in others)
+    (tmp_path / ".b.txt.sealag-draft").symlink_to(precious)
+    with pytest.raises(FileError, match=r"b\.txt cannot be written"):
+        write_text(tmp_path / "b.txt", "x")
+    assert precious.read_text() == "mine"
+
+
+def test_a_new_file_replaces_none(tmp_path):
+    path = tmp_path / "a.txt"
+    write_text(path, "first", replace=False)
+    with pytest.raises(FileError, match="exists already"):
+        write_text(path, "second", replace=False)
+    assert path.read_text() == "first"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_a_file_beside_gets_a_name_of_its_own(tmp_path):
+    names = []
+    for _ in range(3):
+        with Draft(tmp_path / "a.mcap") as draft:
+            names.append(draft.keep_beside("incomplete").name)
+    assert names == ["a.mcap", "a.incomplete.mcap", "a.incomplete-2.mcap"]
+    assert sorted(os.listdir(tmp_path)) == sorted(names)
+
+
+def test_long_names_are_written_or_refused_in_a_sentence(tmp_path):
+    write_text(tmp_path / ("a" * 250), "x")
+    with pytest.raises(FileError, match="too long"):
+        write_text(tmp_path / ("a" * 300), "x")
+    with pytest.raises(FileError, match="too long"):
+        check_output(tmp_path / ("a" * 300))

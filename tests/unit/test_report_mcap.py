@@ -6,6 +6,7 @@ import io
 import json
 import os
 import resource
+import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -80,7 +81,9 @@ def test_ctrl_c_keeps_the_recording_before(tmp_path):
     with pytest.raises(RuntimeError), McapRecorder(path=path, joints=JOINTS) as recorder:
         recorder.write_signal("/x", ["a"], [0.0, 1.0], values=[[1.0], [2.0]])
         raise RuntimeError
-    np.testing.assert_array_equal(read_recording(path).signals["/x"].values[:, 0], [1.0, 2.0])
+    assert len(read_recording(path).signals["/energy"].time) == 3
+    beside = read_recording(tmp_path / "run.incomplete.mcap")
+    np.testing.assert_array_equal(beside.signals["/x"].values[:, 0], [1.0, 2.0])
 
 
 def test_names_and_numbers_that_json_spells_otherwise(tmp_path):
@@ -109,34 +112,47 @@ def test_truncated_file_gives_what_it_holds(tmp_path):
 
 
 class _OnSmallDisk(io.FileIO):
-    """A file on a disk of 1.3 MB; what other files beside it hold counts too."""
+    """A file on a disk of 0.25 MB, and 1 MB more once the reserve is given back."""
+
+    reserves = ()
 
     def write(self, data):
         """Write as much as there is room for."""
-        used = sum(path.stat().st_size for path in Path(os.fspath(self.name)).parent.iterdir())
-        room = 1_300_000 - used
+        room = 250_000 + 1_048_576 * all(one.closed for one in self.reserves) - self.tell()
         if room <= 0:
             raise OSError(errno.ENOSPC, "No space left on device")
         return super().write(bytes(data)[:room])
 
 
 def test_full_disk_keeps_what_was_recorded(tmp_path, monkeypatch):
-    real = builtins.open
+    real_open, real_reserve, reserves = builtins.open, tempfile.TemporaryFile, []
 
     def on_small_disk(path, mode="r", buffering=-1, **options):
         if (mode, buffering) == ("wb", 0):
-            return _OnSmallDisk(path, mode)
-        return real(path, mode, buffering, **options)
+            file = _OnSmallDisk(path, mode, opener=options.get("opener"))
+            file.reserves = reserves
+            return file
+        return real_open(path, mode, buffering, **options)
+
+    def reserve(**options):
+        reserves.append(real_reserve(**options))
+        return reserves[-1]
 
     path = tmp_path / "run.mcap"
+    _write(path, count=3)
     monkeypatch.setattr(builtins, "open", on_small_disk)
-    with pytest.raises(FileError, match="disk is full"):
+    monkeypatch.setattr(tempfile, "TemporaryFile", reserve)
+    with pytest.raises(FileError, match="disk is full") as full:
         _write(path, count=20000)
     monkeypatch.undo()
-    recording = read_recording(path)
+    beside = tmp_path / "run.incomplete.mcap"
+    kept = f"is kept in {beside}, and {path} is as it was."
+    assert str(full.value).endswith(kept)
+    recording = read_recording(beside)
     assert recording.complete
     assert len(recording.signals["/joint_states"].time) > 100
-    assert os.listdir(tmp_path) == ["run.mcap"]
+    assert len(read_recording(path).signals["/joint_states"].time) == 3
+    assert sorted(os.listdir(tmp_path)) == [beside.name, path.name]
 
 
 def test_wrong_shapes_and_files_are_refused(tmp_path):

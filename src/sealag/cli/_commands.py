@@ -12,7 +12,7 @@ from sealag import design
 from sealag.cli._json import show_json
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
-from sealag.files import check_output, write_text
+from sealag.files import Draft, check_output, write_text
 from sealag.passivity import Answer, Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
@@ -35,7 +35,7 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     if ":" not in urdf:
         named = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
     text = design.starter_project(urdf, floating_base=floating_base, named=named)
-    write_text(path, text)
+    write_text(path, text, replace=False)
     return path
 
 
@@ -89,12 +89,13 @@ def certify_project(
     check_output(path, *system.files, *([motion] if motion else []))
     along, count = _motion(system, motion), None if proofs == "all" else int(proofs)
     design.check_question(system, along, criterion, time_varying=time_varying, proofs=count)
-    compile_kernels()
-    with _busy("certifying"):
-        certificate = design.certify(
-            system, along, criterion=criterion, time_varying=time_varying, proofs=count
-        )
-    write_certificate(certificate, path)
+    with Draft(path) as draft:
+        compile_kernels()
+        with _busy("certifying"):
+            certificate = design.certify(
+                system, along, criterion=criterion, time_varying=time_varying, proofs=count
+            )
+        write_certificate(certificate, draft)
     if as_json:
         show_json(certificate.summary())
     else:

@@ -12,7 +12,7 @@ from sealag.cli._commands import compile_kernels
 from sealag.cli._json import show_json
 from sealag.design import System
 from sealag.errors import InputError
-from sealag.files import check_output
+from sealag.files import Draft, check_output
 from sealag.report import run_summary, write_run
 from sealag.simulation import MeasuredGait, Outcome, Run
 from sealag.version import __version__
@@ -42,21 +42,22 @@ def simulate_project(
         system.delays.scaled(delay_scale)
     except InputError as error:
         raise InputError(f"--delay-scale is {delay_scale:g}: {error}") from error
-    compile_kernels()
-    run = _with_progress(
-        "simulating",
-        length,
-        lambda progress: design.simulate(
-            system,
-            scenario=scenario,
-            duration=length,
-            seed=seed,
-            delay_scale=delay_scale,
-            progress=progress,
-        ),
-    )
-    _record(run, system, path)
-    answer = run_summary(run, recording=path)
+    with Draft(path) as draft:
+        compile_kernels()
+        run = _with_progress(
+            "simulating",
+            length,
+            lambda progress: design.simulate(
+                system,
+                scenario=scenario,
+                duration=length,
+                seed=seed,
+                delay_scale=delay_scale,
+                progress=progress,
+            ),
+        )
+        saved = _record(run, system, draft)
+    answer = run_summary(run, recording=saved)
     if (system.simulation.scenario if scenario is None else scenario) == "walk":
         answer |= gait_summary(system, run)
     if as_json:
@@ -67,31 +68,34 @@ def simulate_project(
         raise KeyboardInterrupt
 
 
-def _record(run: Run, system: System, path: Path) -> None:
+def _record(run: Run, system: System, draft: Draft) -> Path:
     """Write the recording with a progress bar; Ctrl-C leaves the one before."""
     end = float(run.time[-1])
     if run.outcome is Outcome.INTERRUPTED:
         print(
             f"sealag: interrupted at {end:.3f} s; recording what was simulated (Ctrl-C again to "
-            f"leave {path} as it is)",
+            f"leave {draft.asked} as it is)",
             file=sys.stderr,
         )
     try:
-        _with_progress(
+        saved = _with_progress(
             "recording",
             end,
             lambda progress: write_run(
                 run,
                 system.robot,
-                path,
+                draft,
                 project=system.text,
                 version=__version__,
                 progress=progress,
             ),
         )
     except KeyboardInterrupt:
-        print(f"sealag: nothing was recorded; {path} is as it was", file=sys.stderr)
+        print(f"sealag: nothing was recorded; {draft.asked} is as it was", file=sys.stderr)
         raise
+    if saved != draft.asked:
+        print(f"sealag: recorded in {saved}; {draft.asked} is as it was", file=sys.stderr)
+    return saved
 
 
 def _with_progress(name: str, length: float, call: Callable[[Progress | None], T]) -> T:

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from sealag.errors import FileError
-from sealag.files import write_text
+from sealag.files import Draft, write_text
 from sealag.passivity._checks import Check
 from sealag.passivity._claims import claim_checks
 from sealag.passivity._definite import Reader, doubles, rationals
@@ -114,12 +114,12 @@ def content_digest(data: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def write_certificate(certificate: Certificate, path: Path) -> None:
+def write_certificate(certificate: Certificate, path: Path | Draft) -> None:
     """Write a certificate as JSON, one field a line, through a temporary name.
 
     Args:
         certificate: what to write.
-        path: where; the folder is made if needed.
+        path: where, or a draft of it; the folder is made if needed.
 
     Raises:
         FileError: it cannot be written, or is larger than what is read.
@@ -128,7 +128,8 @@ def write_certificate(certificate: Certificate, path: Path) -> None:
     lines = (f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in entries)
     text = "{\n" + ",\n".join(lines) + "\n}\n"
     if len(text) > LARGEST_BYTES:
+        name = path.asked if isinstance(path, Draft) else path
         raise FileError(
-            f"{path} would be larger than {LARGEST_BYTES / 1e6:g} MB; ask for fewer proofs."
+            f"{name} would be larger than {LARGEST_BYTES / 1e6:g} MB; ask for fewer proofs."
         )
     write_text(path, text)

@@ -1,7 +1,6 @@
 """Recordings as MCAP, written: joint states, transforms and named signals that Foxglove opens."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -12,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from sealag.errors import FileError, InputError
+from sealag.files import Draft
 from sealag.report._reserved_file import CHUNK_BYTES, ReservedFile
 from sealag.typing import ArrayLike
 
@@ -71,25 +71,34 @@ class _Channel:
     count: int = 0
 
 
+class _DiskFullError(FileError):
+    """The disk filled up; the sentence lacks where the recording is."""
+
+
 @dataclass(slots=True)
 class McapRecorder:
     """Writes a recording block by block; Ctrl-C meanwhile leaves what was there before.
 
     Use it as a context manager. Each block of rows becomes one message a row. Where there is no
-    room for the reserve, a full disk cuts the file off behind its last whole chunk.
+    room for the reserve, a full disk cuts the file off behind its last whole chunk. A recording
+    that is not whole replaces none: it becomes `<stem>.incomplete.mcap` where there is one.
 
     Attributes:
-        path: where the recording goes; it is written beside it as `<name>.partial` and renamed
-            when it is closed.
+        path: where the recording goes, or the draft of it.
         joints: names of the joints of the joint states.
         metadata: what the file says about the run: seed, versions, …
         attachments: files carried along, name to content.
+        whole: whether what is recorded came to its end.
+        saved: where the recording is, once it is closed.
     """
 
-    path: Path
+    path: Path | Draft
     joints: tuple[str, ...]
     metadata: Mapping[str, str] = field(default_factory=dict)
     attachments: Mapping[str, bytes] = field(default_factory=dict)
+    whole: bool = True
+    saved: Path | None = None
+    _draft: Any = None
     _file: Any = None
     _writer: Any = None
     _channels: dict[str, _Channel] = field(default_factory=dict)
@@ -97,18 +106,18 @@ class McapRecorder:
     def __enter__(self) -> Self:
         from mcap.writer import CompressionType, Writer
 
+        self._draft = self.path if isinstance(self.path, Draft) else Draft(self.path)
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = ReservedFile(self._partial)
+            self._file = ReservedFile(self._draft.file, self._draft.path.parent)
             self._writer = Writer(
                 self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD
             )
             self._begin()
         except OSError as error:
-            if self._file is not None:
-                self._file.close()
-                self._partial.unlink()
-            raise FileError(f"{self.path} cannot be written: {error.strerror or error}.") from error
+            self._draft.drop()
+            raise FileError(
+                f"{self._draft.asked} cannot be written: {error.strerror or error}."
+            ) from error
         return self
 
     def _begin(self) -> None:
@@ -126,27 +135,30 @@ class McapRecorder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        failure: OSError | None = self._file.failure
-        try:
-            if failure is None:
-                self._writer.finish()
-        except OSError as late:
-            failure = late
-        finally:
-            self._file.close()
+        draft, failure = self._draft, self._file.failure
+        with draft:
+            try:
+                if failure is None:
+                    self._writer.finish()
+            except OSError as late:
+                failure = late
+            finally:
+                self._file.release()
             if kind is KeyboardInterrupt:
-                self._partial.unlink()
-            else:
-                os.replace(self._partial, self.path)
+                return
+            if self.whole and kind is None and failure is None:
+                draft.keep()
+                self.saved = draft.asked
+                return
+            self.saved = saved = draft.keep_beside("incomplete")
+        kept = "what was recorded until then is kept"
+        if saved != draft.asked:
+            kept += f" in {saved}, and {draft.asked} is as it was"
         if failure is not None:
-            raise FileError(
-                f"{self.path} is cut off: {failure.strerror or failure}; "
-                "what was recorded until then is kept."
-            ) from failure
-
-    @property
-    def _partial(self) -> Path:
-        return self.path.with_name(self.path.name + ".partial")
+            cut = f"{draft.asked} is cut off: {failure.strerror or failure}"
+            raise FileError(f"{cut}; {kept}.") from failure
+        if isinstance(error, _DiskFullError):
+            raise FileError(f"{error}; {kept}.") from error
 
     def note(self, name: str, values: Mapping[str, str]) -> None:
         """Add metadata that is known only at the end, such as the outcome.
@@ -300,9 +312,8 @@ class McapRecorder:
             )
             channel.count += 1
             if self._file.full:
-                raise FileError(
-                    f"{self.path} stops at {stamp:.3f} s because the disk is full; "
-                    "what was recorded until then is kept."
+                raise _DiskFullError(
+                    f"{self._draft.asked} stops at {stamp:.3f} s because the disk is full"
                 )
 
 

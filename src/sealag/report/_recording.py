@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from sealag.files import Draft
 from sealag.report._mcap import McapRecorder
 from sealag.robot import Robot
-from sealag.simulation import Run
+from sealag.simulation import Outcome, Run
 from sealag.typing import Array
 
 _BLOCK = 500
@@ -16,12 +17,12 @@ _BLOCK = 500
 def write_run(
     run: Run,
     robot: Robot,
-    path: Path,
+    path: Path | Draft,
     *,
     project: str,
     version: str,
     progress: Callable[[float], None] | None = None,
-) -> None:
+) -> Path:
     """Write a run: joint states, torques, link poses, contact, energy, works and origin.
 
     How the run ended is written last, so that a recording that a full disk cut off does not say it.
@@ -29,10 +30,13 @@ def write_run(
     Args:
         run: the run.
         robot: whose run it is.
-        path: the MCAP file.
+        path: the MCAP file, or the draft of it.
         project: text of the project file, attached.
         version: of sealag.
         progress: called with the time up to which the run is written, s.
+
+    Returns:
+        Where the recording is: beside the path if the run was interrupted and another is there.
 
     Raises:
         FileError: it cannot be written; a full disk leaves what was written readable.
@@ -56,8 +60,9 @@ def write_run(
     if run.feet:
         tables["/contact"] = _contacts(run)
     with McapRecorder(
-        path=path, joints=run.joints, metadata=metadata, attachments=attachments
-    ) as recorder:
+        path=path, joints=run.joints, metadata=metadata, attachments=attachments,
+        whole=run.outcome is not Outcome.INTERRUPTED,
+    ) as recorder:  # fmt: skip
         for first in range(0, len(run.time), _BLOCK):
             rows = slice(first, first + _BLOCK)
             time = run.time[rows]
@@ -81,6 +86,8 @@ def write_run(
             if progress is not None:
                 progress(float(time[-1]))
         recorder.note("end", {"outcome": run.outcome.value, "message": run.message})
+    assert recorder.saved is not None
+    return recorder.saved
 
 
 def _ages(run: Run) -> dict[str, Array]:

@@ -2,6 +2,8 @@
 
 import errno
 import os
+import tempfile
+from io import FileIO
 from pathlib import Path
 
 CHUNK_BYTES = 256 * 1024
@@ -11,29 +13,30 @@ _RESERVE_BYTES = 4 * CHUNK_BYTES  # for the last chunk and the index
 
 
 class ReservedFile:
-    """A file that keeps room beside it, where there is any, to be closed properly on a full disk.
+    """A file that keeps room, where there is any, to be finished properly on a full disk.
+
+    The room is a file without a name: nothing of it is left if the process is killed.
 
     Args:
-        path: the file, opened for writing.
+        file: the file, opened for writing, unbuffered; whoever opened it closes it.
+        folder: where it lies.
 
     Attributes:
         full: whether the reserve was needed.
         failure: why something could not be written; nothing of it is in the file.
 
     Raises:
-        OSError: the file cannot be opened.
+        OSError: no file can be made in the folder.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
-        self._reserve = path.with_name(path.name + ".reserve")
+    def __init__(self, file: FileIO, folder: Path) -> None:
+        self._file, self._reserve = file, tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
         self.full = False
         self.failure: OSError | None = None
         try:
-            with open(self._reserve, "wb") as reserve:
-                os.posix_fallocate(reserve.fileno(), 0, _RESERVE_BYTES)
+            os.posix_fallocate(self._reserve.fileno(), 0, _RESERVE_BYTES)
         except OSError:
-            self._reserve.unlink(missing_ok=True)
+            self.release()
 
     def write(self, data: bytes) -> int:
         """Write all of it, on a full disk where the reserve was; return how many bytes.
@@ -54,7 +57,7 @@ class ReservedFile:
                 self.failure = error
                 raise
             self.full = True
-            self._reserve.unlink(missing_ok=True)
+            self.release()
             self.write(data)
         return len(data)
 
@@ -71,7 +74,6 @@ class ReservedFile:
         """Do nothing that the operating system does not do anyway."""
         self._file.flush()
 
-    def close(self) -> None:
-        """Close the file and give its reserve back."""
-        self._file.close()
-        self._reserve.unlink(missing_ok=True)
+    def release(self) -> None:
+        """Give the room back."""
+        self._reserve.close()
