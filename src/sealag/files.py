@@ -77,6 +77,16 @@ def check_output(path: Path, *inputs: Path) -> None:
         raise FileError(f"{path} is an input and is not overwritten; choose another --out.")
 
 
+def is_inside(path: Path, folder: Path) -> bool:
+    """Whether a path, once `..` is resolved, lies in a folder.
+
+    Args:
+        path: the path.
+        folder: the folder; links in it are not followed.
+    """
+    return Path(os.path.normpath(path)).is_relative_to(os.path.normpath(folder))
+
+
 def make_folder(path: Path) -> None:
     """Make a folder with those above it, if it is not there.
 
@@ -291,6 +301,7 @@ def write_text(path: Path | Draft, text: str, *, replace: bool = True) -> None:
 __all__ = [
     "Draft",
     "check_output",
+    "is_inside",
     "make_folder",
     "read_whole",
     "write_text",

@@ -8,7 +8,6 @@ import os
 import resource
 import tempfile
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest

@@ -1,7 +1,10 @@
 """The command line: options, exit statuses, messages. Commands import what they use."""
 
 import os
+import shlex
 import sys
+import tempfile
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +12,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
+from sealag.cli._terminal import open_streams, show
 from sealag.errors import SealagError, SolverError
 from sealag.version import __version__
 
@@ -43,7 +47,7 @@ MotionFile = Annotated[
 
 def _show_version(asked: bool) -> None:
     if asked:
-        print(f"sealag {__version__}")
+        show(f"sealag {__version__}")
         raise typer.Exit
 
 
@@ -71,7 +75,7 @@ def init(
     from sealag.cli._commands import init_project
 
     path = init_project(urdf, out, floating_base=floating)
-    print(f"Wrote {path}; replace each FILL in it, then run: sealag certify {path}")
+    show(f"Wrote {path}; replace each FILL in it, then run: sealag certify {path}")
 
 
 @app.command()
@@ -250,6 +254,24 @@ def _write_no_more() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def _report(error: Exception, words: Sequence[str]) -> str:
+    """Write what a failure of the tool itself leaves to know; return where, or an empty text."""
+    lines = [
+        f"sealag {__version__}, Python {sys.version}, {sys.platform}",
+        f"command: {shlex.join(['sealag', *words])}",
+        f"folder: {os.getcwd()}",
+        "",
+        *traceback.format_exception(error),
+    ]
+    try:
+        handle, path = tempfile.mkstemp(prefix="sealag-failure-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write("\n".join(lines))
+    except OSError:
+        return ""
+    return path
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and end the process with its status.
 
@@ -260,13 +282,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         arguments: what follows the program's name; the process's own if None.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    answered = open_streams()
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         status = app(args=words, prog_name="sealag", standalone_mode=False)
         sys.stdout.flush()
     except SealagError as error:
-        line = str(error).replace("\n", "\\n")
-        print(f"sealag: {line}", file=sys.stderr)
+        show(f"sealag: {error}", error=True)
         raise SystemExit(FAILED if isinstance(error, SolverError) else WRONG_INPUT) from None
     except TyperException as error:
         known = {
@@ -274,20 +296,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
         }
         asked = f"{words[0]} " if words[0] in known else ""
         problem = error.format_message().rstrip(".")
-        print(f"sealag: {problem}; see sealag {asked}--help.", file=sys.stderr)
+        show(f"sealag: {problem}; see sealag {asked}--help.", error=True)
         raise SystemExit(WRONG_INPUT) from None
     except (BrokenPipeError, SystemExit):  # Typer ends with 1, a no, when the reader is gone
         _write_no_more()
         raise SystemExit(FAILED) from None
     except Exception as error:
         _write_no_more()
-        words = " ".join(str(error).split())[:300]
-        print(
-            f"sealag: the tool itself failed ({type(error).__name__}: {words}); this is no answer "
-            "about the design. Please report it with the command and its files.",
-            file=sys.stderr,
+        said = " ".join(str(error).split())[:300]
+        report = _report(error, words)
+        show(
+            f"sealag: the tool itself failed ({type(error).__name__}: {said}); this is no answer "
+            f"about the design. Please report it with {report or 'the command'} and its files.",
+            error=True,
         )
         raise SystemExit(FAILED) from None
     if status == INTERRUPTED:
-        print("sealag: interrupted", file=sys.stderr)
+        show("sealag: interrupted", error=True)
+    if not answered and status in (0, 1):
+        show("sealag: standard output is closed; nobody can read the answer", error=True)
+        raise SystemExit(FAILED)
     raise SystemExit(status or 0)

@@ -1,7 +1,6 @@
 """Commands: each calls one function of the library and shows its answer."""
 
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
@@ -10,6 +9,7 @@ from typing import Any
 
 from sealag import design
 from sealag.cli._json import show_json
+from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import Draft, check_output, write_text
@@ -45,9 +45,9 @@ def compile_kernels() -> None:
 
     if compiled():
         return
-    print("sealag: compiling its kernels, once after the installation (minutes)", file=sys.stderr)
+    show("sealag: compiling its kernels, once after the installation (minutes)", error=True)
     compile_all(
-        lambda name: print(f"sealag: compiling {name}", file=sys.stderr, flush=True),
+        lambda name: show(f"sealag: compiling {name}", error=True),
         missing_only=True,
     )
 
@@ -139,15 +139,15 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
     if answer.time_varying_delay_s is not None:
         rows.insert(4, ("time-varying matrices", time_text(answer.time_varying_delay_s)))
     for name, value in rows:
-        print(f"{name:26} {value}")
+        show(f"{name:26} {value}")
     if answer.status is Status.CERTIFIED and answer.stable is not True:
-        print("passive but not stable: without further control the robot falls or drifts")
+        show("passive but not stable: without further control the robot falls or drifts")
     for reason in answer.reasons:
-        print(f"not certified because {reason}")
+        show(f"not certified because {reason}")
     for bound, reason in answer.left_open.items():
-        print(f"open whether {bound} is longer: {reason}")
+        show(f"open whether {bound} is longer: {reason}")
     for assumption in answer.assumptions:
-        print(f"assumed: {assumption.text}")
+        show(f"assumed: {assumption.text}")
 
 
 def margin_project(
@@ -169,17 +169,17 @@ def margin_project(
     if as_json:
         show_json(answer)
         return
-    print(f"{'local margin':26} {time_text(found.delay_s)}")
-    print(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
+    show(f"{'local margin':26} {time_text(found.delay_s)}")
+    show(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
     if found.frequency_rad_s is not None:
-        print(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
-    print(f"{'unstable roots':26} {found.unstable_modes} without delay")
-    print(f"{'zero roots of symmetries':26} {found.neutral}")
-    print(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
+        show(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
+    show(f"{'unstable roots':26} {found.unstable_modes} without delay")
+    show(f"{'zero roots of symmetries':26} {found.neutral}")
+    show(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
     mode = sorted(found.mode.items(), key=lambda item: -item[1])
-    print(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
+    show(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
     for low, high, count in found.intervals:
-        print(f"{time_text(low):>14} to {time_text(high):14} {count} unstable roots")
+        show(f"{time_text(low):>14} to {time_text(high):14} {count} unstable roots")
 
 
 def verify_certificate(
@@ -215,13 +215,13 @@ def verify_certificate(
     else:
         good = [check for check in result.checks if check.ok]
         for check in good[:LARGEST_LIST]:
-            print(f"ok   {check.name}: {check.detail}")
+            show(f"ok   {check.name}: {check.detail}")
         if len(good) > LARGEST_LIST:
-            print(f"ok   {len(good) - LARGEST_LIST} more checks (--json lists them)")
+            show(f"ok   {len(good) - LARGEST_LIST} more checks (--json lists them)")
         for check in result.checks:
             if not check.ok:
-                print(f"BAD  {check.name}: {check.detail}")
-        print("the certificate holds" if result.valid else "the certificate does not hold")
+                show(f"BAD  {check.name}: {check.detail}")
+        show("the certificate holds" if result.valid else "the certificate does not hold")
     return 0 if result.valid else 1
 
 
@@ -234,16 +234,15 @@ def _second(path: Path, *, as_json: bool) -> int:
         for name, holds, detail in claims(read(str(path))):
             found.append({"name": name, "holds": holds, "detail": detail})
             if not as_json:
-                line = f"{words[holds]:14} {name}: {detail}".rstrip(": ")
-                print("".join(filter(str.isprintable, line)), flush=True)
+                show(f"{words[holds]:14} {name}: {detail}".rstrip(": "))
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        problem = "".join(filter(str.isprintable, str(error)))[:200]
+        problem = str(error)[:200]
         raise CertificateError(f"{path} is not a certificate: {problem}.") from error
     valid = all(one["holds"] is not False for one in found)
     if as_json:
         show_json({"valid": valid, "claims": found})
     else:
-        print("no claim fails" if valid else "the certificate does not hold")
+        show("no claim fails" if valid else "the certificate does not hold")
     return 0 if valid else 1
 
 
@@ -262,9 +261,9 @@ def write_paper(project: str, out: Path, *, quick: bool, as_json: bool) -> None:
         out,
         project=project,
         quick=quick,
-        progress=lambda text: print(text, file=sys.stderr, flush=True),
+        progress=lambda text: show(text, error=True),
     )
     if as_json:
         show_json(answer)
     else:
-        print(f"Wrote {answer['page']}")
+        show(f"Wrote {answer['page']}")

@@ -10,6 +10,7 @@ import numpy as np
 from sealag import design
 from sealag.cli._commands import compile_kernels
 from sealag.cli._json import show_json
+from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import InputError
 from sealag.files import Draft, check_output
@@ -72,10 +73,10 @@ def _record(run: Run, system: System, draft: Draft) -> Path:
     """Write the recording with a progress bar; Ctrl-C leaves the one before."""
     end = float(run.time[-1])
     if run.outcome is Outcome.INTERRUPTED:
-        print(
+        show(
             f"sealag: interrupted at {end:.3f} s; recording what was simulated (Ctrl-C again to "
             f"leave {draft.asked} as it is)",
-            file=sys.stderr,
+            error=True,
         )
     try:
         saved = _with_progress(
@@ -91,10 +92,10 @@ def _record(run: Run, system: System, draft: Draft) -> Path:
             ),
         )
     except KeyboardInterrupt:
-        print(f"sealag: nothing was recorded; {draft.asked} is as it was", file=sys.stderr)
+        show(f"sealag: nothing was recorded; {draft.asked} is as it was", error=True)
         raise
     if saved != draft.asked:
-        print(f"sealag: recorded in {saved}; {draft.asked} is as it was", file=sys.stderr)
+        show(f"sealag: recorded in {saved}; {draft.asked} is as it was", error=True)
     return saved
 
 
@@ -131,32 +132,32 @@ def gait_summary(system: System, run: Run) -> dict[str, Any]:
 
 def _show(run: Run, answer: dict[str, Any]) -> None:
     books = run.audit
-    print(f"{'outcome':26} {answer['outcome']} {answer['message']}".rstrip())
-    print(f"{'simulated':26} {answer['duration_s']:.3f} s")
-    print(f"{'measurement at most':26} {answer['measurement_age_s'] * 1e3:.2f} ms old")
-    print(f"{'command at most':26} {answer['command_age_s'] * 1e3:.2f} ms old")
-    print(f"{'both together at most':26} {answer['total_age_s'] * 1e3:.2f} ms old")
+    show(f"{'outcome':26} {answer['outcome']} {answer['message']}".rstrip())
+    show(f"{'simulated':26} {answer['duration_s']:.3f} s")
+    show(f"{'measurement at most':26} {answer['measurement_age_s'] * 1e3:.2f} ms old")
+    show(f"{'command at most':26} {answer['command_age_s'] * 1e3:.2f} ms old")
+    show(f"{'both together at most':26} {answer['total_age_s'] * 1e3:.2f} ms old")
     for name, values in books.stores.items():
-        print(f"{name + ' energy':26} {values[0]:.4f} J at first, {values[-1]:.4f} J at last")
+        show(f"{name + ' energy':26} {values[0]:.4f} J at first, {values[-1]:.4f} J at last")
     for name, works in books.joint_flows.items():
         label = f"{name.removesuffix('_work').replace('_', ' ')} work"
-        print(f"{label:26} {float(works[-1].sum()):.4f} J")
-    print(
+        show(f"{label:26} {float(works[-1].sum()):.4f} J")
+    show(
         f"{'first law':26} open by {answer['energy_residual_j']:.2e} J of "
         f"{answer['energy_throughput_j']:.4g} J moved"
     )
     if books.delay_injection is not None and books.law_injection is not None:
         within = f"within {answer['injection_error_j']:.1e} J"
-        print(f"{'injected by the delay':26} {answer['delay_injection_j']:.4g} J at most, {within}")
+        show(f"{'injected by the delay':26} {answer['delay_injection_j']:.4g} J at most, {within}")
         moved = abs(answer["law_injection_j"])
-        print(f"{'injected by moving law':26} {moved:.4g} J at most, {within}")
+        show(f"{'injected by moving law':26} {moved:.4g} J at most, {within}")
     if books.delay_storage is not None:
-        print(
+        show(
             f"{'stored in the delay, V_4':26} {answer['delay_storage_j']:.4g} J at most, within "
             f"{answer['delay_storage_error_j']:.1e} J"
         )
     if books.tank is not None:
-        print(f"{'energy tank':26} {books.tank[0]:.4f} J at first, {books.tank[-1]:.4f} J at last")
+        show(f"{'energy tank':26} {books.tank[0]:.4f} J at first, {books.tank[-1]:.4f} J at last")
     sides = {
         "joint side": books.joint_side,
         "controller side": books.controller_side,
@@ -164,11 +165,11 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
     }
     for name, side in sides.items():
         if side is not None:
-            print(f"{name:26} {side.verdict}")
+            show(f"{name:26} {side.verdict}")
     if "steps" in answer:
         speeds = ", ".join(f"{v:.2f}" for v in answer["apex_speed_m_s"])
         widths = ", ".join(f"{w:.2f}" for w in answer["step_width_m"])
-        print(f"{'steps':26} {answer['steps']}{'' if answer['gait'] else ', not a gait'}")
-        print(f"{'apex speeds':26} {speeds} m/s")
-        print(f"{'step widths':26} {widths} m")
-    print(f"{'recording':26} {answer['recording']}")
+        show(f"{'steps':26} {answer['steps']}{'' if answer['gait'] else ', not a gait'}")
+        show(f"{'apex speeds':26} {speeds} m/s")
+        show(f"{'step widths':26} {widths} m")
+    show(f"{'recording':26} {answer['recording']}")

@@ -25,12 +25,12 @@ _DRIFT = 1e-9
 """1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
 
 _BESIDE = 1e-3
-"""rad: distance over which a law is differentiated once more in a singular posture. Over 3e-5 rad it
-does without the direction that it lost; a robot moves further than that."""
+"""rad: distance over which a law is differentiated once more in a singular posture. Over 3e-5 rad
+it does without the direction that it lost; a robot moves further than that."""
 
 _BEND = 1e-4
-"""Share of a law's derivative that may change over `_BESIDE`: smooth laws stay 1e-6 apart, bent ones
-1e-2."""
+"""Share of a law's derivative that may change over `_BESIDE`: smooth laws stay 1e-6 apart, bent
+ones 1e-2."""
 
 _MOST_DRIFTING = 8  # zero roots that are counted
 
@@ -294,7 +294,8 @@ class _Decision:
             if loop.bend > _BEND:
                 problem = problem or (
                     "a task or contact loses a direction in this posture, and the law's stiffness "
-                    f"beside it differs by {loop.bend:.1%}, so that no margin holds; choose another posture"
+                    f"beside it differs by {loop.bend:.1%}, so that no margin holds; choose "
+                    "another posture"
                 )
             else:
                 margin = margin_of(loop)

@@ -24,7 +24,7 @@ from sealag.design._plain_words import first_problem
 from sealag.design._schema import AXES, Project, SamplesDelay
 from sealag.design._system import Source, System
 from sealag.design._walking import walking_of
-from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError
+from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError, either
 from sealag.files import read_whole
 from sealag.passivity import Criterion
 from sealag.robot import (
@@ -60,11 +60,10 @@ def resolve_project(text: str | Path) -> Path:
 
     folder = Path(str(resources.files("sealag.data")))
     name = str(text).removeprefix("bundled:").removesuffix(".toml")
-    path = folder / f"{name}.toml"
-    if not path.is_file():
-        known = ", ".join(sorted(found.stem for found in folder.glob("*.toml")))
-        raise UnknownNameError(f"No bundled project is called {name!r}; there is {known}.")
-    return path
+    known = sorted(found.stem for found in folder.glob("*.toml"))
+    if name not in known:
+        raise UnknownNameError(f"No bundled project is called {name!r}; there is {either(known)}.")
+    return folder / f"{name}.toml"
 
 
 def load(path: str | Path) -> System:
@@ -326,9 +325,7 @@ def _samples(section: Any, folder: Path) -> DelaySignal:
     for row, line in enumerate(content.decode("utf-8-sig", "replace").splitlines(), start=1):
         value = number_of(line)
         if value is None and line.strip():
-            raise ProjectError(
-                f"{path}: line {row} is {line.strip()[:60]!r}; one number, a delay in ms, is right."
-            )
+            raise ProjectError(f"{path}: line {row} is no number; one delay in ms a line is right.")
         values += [] if value is None else [value]
     if not values:
         raise ProjectError(f"{path} is empty; one delay in ms a line is needed.")

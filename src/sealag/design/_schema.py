@@ -51,6 +51,7 @@ def _within(low: float, high: float, unit: str = "", *, or_zero: bool = False) -
 
 
 Milliseconds = Annotated[FiniteFloat, _within(0, 5000, "ms")]
+Period = Annotated[FiniteFloat, _within(1e-3, 5000, "ms", or_zero=True)]
 Length = Annotated[FiniteFloat, _within(1e-6, 1e3, "m")]
 LengthOrZero = Annotated[FiniteFloat, _within(0, 1e3, "m")]
 Coordinate = Annotated[FiniteFloat, _within(-1e4, 1e4, "m")]
@@ -227,8 +228,8 @@ class DelaysSection(Section):
     embedded_round_trip: DelayKeys | None = None
     embedded_up: DelayKeys | None = None
     embedded_down: DelayKeys | None = None
-    sample_time_ms: Milliseconds = 0.0
-    embedded_period_ms: Milliseconds = 0.0
+    sample_time_ms: Period = 0.0
+    embedded_period_ms: Period = 0.0
     delayed_torque_feedback: bool = False
 
 

@@ -146,6 +146,7 @@ def _step() -> None:
     )
     plant.sense(kept, 0.0, np.zeros(1 + _NQ + _NV + 3 + 2))
     motor.rate_rows(tuple(parts.motors), True, np.zeros((6, 1)), np.zeros((6, 1)))
+    motor.fastest_rates(tuple(parts.motors), True, np.zeros(1))
     start = (0.0, 0, 0, run.WATCH)
     run.drive(kept, keep(run.idle(1)), plant.STORE, 1e-3, parts.contacts.closed, three, start, 1.0)
 

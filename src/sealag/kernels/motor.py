@@ -284,6 +284,20 @@ def _integrate(series, order, link, t, works):
     return Works(squared, port, shaft, slip, motor)
 
 
+@entry
+def fastest_rates(raw_motors, instant, out):
+    """Write a bound of the rate at which each rotor's state moves within limits (n,), 1/s.
+
+    Args:
+        raw_motors: all joints.
+        instant: whether torque feedback is not delayed.
+        out: (n,), written.
+    """
+    motors = Motors(*raw_motors)
+    for j in range(len(out)):
+        out[j] = _fastest(motors, j, instant, False)
+
+
 @shared
 def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     """Move rotor j along its link's cubic while its drive does one thing.

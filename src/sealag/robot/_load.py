@@ -1,11 +1,12 @@
 """Reading a URDF: finding it, checking it, locking what is not actuated."""
 
+import ctypes
 import hashlib
-import os
+import subprocess
 import sys
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,12 +16,15 @@ import numpy as np
 import pinocchio as pin
 
 from sealag.errors import FileError, RobotError, UnknownNameError, either, near
-from sealag.files import read_whole
+from sealag.files import is_inside, read_whole
 from sealag.robot._mimic import Coupling, Follower, read_followers
 from sealag.robot._urdf import LEAST_INERTIA, ROOT_JOINT, check_urdf, joint_dynamics
 from sealag.typing import Array
 
 LARGEST_URDF_BYTES = 50_000_000
+_LOG = "libconsole_bridge.so.1.0"
+_SET_LOG_LEVEL = "_ZN14console_bridge11setLogLevelENS_8LogLevelE"  # setLogLevel(LogLevel) in C++
+_LOG_NOTHING = 4  # CONSOLE_BRIDGE_LOG_NONE
 _ROUNDED = 0.05  # of the largest moment: what two significant digits do to a plate's
 _SINGULAR = 1e-9  # least eigenvalue of the mass matrix scaled to a unit diagonal
 
@@ -35,9 +39,9 @@ def bundled_robot_path(name: str) -> Path:
         UnknownNameError: there is no such robot.
     """
     folder = Path(str(resources.files("sealag.data")))
-    path = folder / (name if name.endswith(".urdf") else f"{name}.urdf")
-    if not path.is_file():
-        known = [found.stem for found in folder.glob("*.urdf")]
+    known = [found.stem for found in folder.glob("*.urdf")]
+    path = folder / f"{name.removesuffix('.urdf')}.urdf"
+    if path.stem not in known or path.parent != folder:
         raise UnknownNameError(f"No bundled robot is called {name!r}; there is {either(known)}.")
     return path
 
@@ -58,8 +62,9 @@ def example_robot_path(relative: str) -> Path:
         for leaf in (None, "cmeel.prefix/share")
     ] + [Path(sys.prefix) / "share"]
     for root in roots:
-        path = root / "example-robot-data" / "robots" / relative
-        if path.is_file():
+        folder = root / "example-robot-data" / "robots"
+        path = folder / relative
+        if is_inside(path, folder) and path.is_file():
             return path
     raise FileError(
         f"The example robot {relative} is not installed; "
@@ -76,13 +81,16 @@ def resolve_urdf(text: str, *, relative_to: Path = Path()) -> Path:
 
     Raises:
         UnknownNameError: no bundled robot has this name.
-        FileError: an example robot is not installed.
+        FileError: an example robot is not installed, or a home folder does not exist.
     """
     if text.startswith("bundled:"):
         return bundled_robot_path(text.removeprefix("bundled:"))
     if text.startswith("example-robot-data:"):
         return example_robot_path(text.removeprefix("example-robot-data:"))
-    return relative_to / Path(text).expanduser()
+    try:
+        return relative_to / Path(text).expanduser()
+    except RuntimeError as error:  # ~nobody
+        raise FileError(f"{text!r} names the home folder of a user who does not exist.") from error
 
 
 class Description(NamedTuple):
@@ -125,15 +133,12 @@ def read_model(path: Path, *, floating_base: bool) -> Description:
     for joint in root.iterfind("joint[@type='continuous']"):
         _unlimit(joint)
     text, build = ElementTree.tostring(root, encoding="unicode"), pin.buildModelFromXML
-    model, reason = None, ""
-    with _overheard() as errors:
-        try:
-            model = build(text, pin.JointModelFreeFlyer()) if floating_base else build(text)
-        except Exception as error:
-            reason = " ".join(str(error).split())[:200]
-    said = "; ".join(errors) or reason
-    if model is None or said:
-        raise RobotError(f"{path} cannot be read as a robot: {said.rstrip('.')}.")
+    _silence_parser()
+    try:
+        model = build(text, pin.JointModelFreeFlyer()) if floating_base else build(text)
+    except Exception as error:
+        reason = _parser_words(text) or " ".join(str(error).split())[:200]
+        raise RobotError(f"{path} cannot be read as a robot: {reason.rstrip('.')}.") from error
     _check_bodies(model, path)
     dynamics = {j.get("name", ""): joint_dynamics(j) for j in root.iterfind("joint")}
     return Description(model, followers, dynamics, hashlib.sha256(content).hexdigest())
@@ -168,23 +173,31 @@ def _unlimit(joint: ElementTree.Element) -> None:
     limit.set("upper", "1e9")
 
 
-@contextmanager
-def _overheard() -> Iterator[list[str]]:
-    """Keep what the URDF parser prints to standard error from the user, and collect its errors."""
-    sys.stderr.flush()
-    errors: list[str] = []
-    saved = os.dup(2)
-    with tempfile.TemporaryFile() as heard:
-        try:
-            os.dup2(heard.fileno(), 2)
-            yield errors
-        finally:
-            os.dup2(saved, 2)
-            os.close(saved)
-            heard.seek(0)
-            lines = heard.read().decode("utf-8", "replace").splitlines()
-    said = [" ".join(line.removeprefix("Error:").split()) for line in lines if "Error:" in line]
-    errors += [line.rstrip(".") for line in said if "xml is not initialized" not in line]
+@cache
+def _silence_parser() -> None:
+    """Keep the URDF parser from printing its complaints to the process's standard error.
+
+    It logs through console_bridge, which Python does not reach otherwise. Where the library has
+    another name, the parser prints.
+    """
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(_LOG)[_SET_LOG_LEVEL](_LOG_NOTHING)
+
+
+def _parser_words(text: str) -> str:
+    """What the parser says about a URDF that it refuses; heard in a process of its own."""
+    program = "import pinocchio, sys; pinocchio.buildModelFromXML(sys.stdin.read())"
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", program], input=text.encode("utf-8", "replace"),
+            capture_output=True, timeout=60, check=False,
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    lines = done.stderr.decode("utf-8", "replace").splitlines()
+    said = [line.removeprefix("Error:") for line in lines if line.startswith("Error:")]
+    words = [" ".join(line.split()) for line in said if "xml is not initialized" not in line]
+    return "; ".join(word.rstrip(".") for word in words)[:300]
 
 
 def check_inertias(model: Any, coupling: Coupling, path: Path) -> None:

@@ -1,5 +1,6 @@
 """The robot: names, limits, configurations and its dynamics at one configuration."""
 
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -71,7 +72,7 @@ class Robot:
     _model: Any = field(repr=False)
     tree: "Tree" = field(init=False, repr=False, compare=False)
     _coupling: Coupling = field(init=False, repr=False, compare=False)
-    _scratch: list[Workspace] = field(default_factory=list, repr=False, compare=False)
+    _scratch: threading.local = field(default_factory=threading.local, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Take coupling and tree from the model."""
@@ -111,7 +112,7 @@ class Robot:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore from a pickle."""
-        for name, value in {**state, "_scratch": []}.items():
+        for name, value in {**state, "_scratch": threading.local()}.items():
             object.__setattr__(self, name, value)
 
     def workspace(self) -> Workspace:
@@ -119,7 +120,7 @@ class Robot:
         return Workspace(self._model, self._coupling, self.tree, nv_base=self.nv_base)
 
     def workspace_at(self, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
-        """Return the robot's own scratch memory, evaluated; the next call of it overwrites it.
+        """Return the robot's scratch memory of this thread, evaluated; its next call overwrites it.
 
         Args:
             q: (nq,).
@@ -128,12 +129,13 @@ class Robot:
         return self._at(q, v)
 
     def _at(self, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
-        if not self._scratch:
-            self._scratch.append(self.workspace())
+        mine = self._scratch
+        if not hasattr(mine, "workspace"):
+            mine.workspace = self.workspace()
         q = self._checked(q, self.nq, "configuration")
         v = np.zeros(self.nv) if v is None else self._checked(v, self.nv, "velocity")
-        self._scratch[0].update(q, v)
-        return self._scratch[0]
+        mine.workspace.update(q, v)
+        return mine.workspace
 
     def _checked(self, values: ArrayLike, length: int, what: str) -> Array:
         array = np.ascontiguousarray(values, dtype=float)

@@ -19,6 +19,7 @@ _ENDS = ("lower", "upper")
 _ENTRIES = ("ixx", "ixy", "ixz", "ixy", "iyy", "iyz", "ixz", "iyz", "izz")
 _INDEFINITE = 1e-6  # of a body's inertia: what rounding in a URDF does to a principal moment
 _PLACEHOLDER = 0.2  # of a body's inertia: sensors and covers fixed to public robots reach 0.15
+_MOST_MASS, _MOST_INERTIA, _MOST_LENGTH = 1e7, 1e9, 1e4  # kg, kg m², m: ships, in all three
 _MOST_DAMPING = 1e6  # Nms/rad, Nm: as in a project file; more is a slip of the unit
 
 
@@ -46,6 +47,10 @@ def check_urdf(root: Element, path: Path) -> None:
     _check_tree(root, path)
     for joint in root.iterfind("joint"):
         _check_joint(joint, path)
+        _check_origin(joint, f"joint {joint.get('name')}", path)
+    for link in root.iterfind("link"):
+        for inertial in link.iterfind("inertial"):
+            _check_origin(inertial, f"<inertial> of link {link.get('name')}", path)
     _check_inertias(root, path)
 
 
@@ -146,6 +151,19 @@ def _check_joint(joint: Element, path: Path) -> None:
             )
 
 
+def _check_origin(element: Element, owner: str, path: Path) -> None:
+    """Refuse places and turns that are no three numbers, or too far away to compute with."""
+    origin = element.find("origin")
+    for key, unit in (("xyz", "m"), ("rpy", "rad")):
+        text = "0 0 0" if origin is None else origin.get(key, "0 0 0")
+        values = [number(word) for word in text.split()]
+        if len(values) != 3 or not all(abs(value) <= _MOST_LENGTH for value in values):
+            raise RobotError(
+                f"{path}: {key} of {owner} is {text!r}; it must be three numbers in "
+                f"{-_MOST_LENGTH:g} … {_MOST_LENGTH:g} {unit}."
+            )
+
+
 def _check_inertias(root: Element, path: Path) -> None:
     """Refuse links that are no rigid bodies: I ≽ 0 and its largest moment ≤ the other two's sum.
 
@@ -192,16 +210,16 @@ def _principal_moments(link: Element, path: Path) -> Array:
     if mass is None or inertia is None:
         raise RobotError(f"{path}: <inertial> of link {name} needs both <mass> and <inertia>.")
     weight = mass.get("value", "")
-    if not 0.0 <= number(weight) < math.inf:
+    if not 0.0 <= number(weight) <= _MOST_MASS:
         raise RobotError(
-            f"{path}: the mass of link {name} is {weight!r}; it must be a finite number of kg, at "
-            "least 0."
+            f"{path}: the mass of link {name} is {weight!r}; it must be a number of kg in "
+            f"0 … {_MOST_MASS:g}."
         )
     for key in _ENTRIES:
-        if not math.isfinite(number(inertia.get(key, ""))):
+        if not abs(number(inertia.get(key, ""))) <= _MOST_INERTIA:
             raise RobotError(
-                f"{path}: {key} of link {name} is {inertia.get(key, '')!r}; it must be a finite "
-                "number of kg m²."
+                f"{path}: {key} of link {name} is {inertia.get(key, '')!r}; it must be a number "
+                f"of kg m² of at most {_MOST_INERTIA:g}."
             )
     return np.linalg.eigvalsh(
         np.array([number(inertia.get(key, "")) for key in _ENTRIES]).reshape(3, 3)

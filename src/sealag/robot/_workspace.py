@@ -43,11 +43,11 @@ class Workspace:
         from sealag.kernels import dynamics
 
         self._model, self._kernel = model, dynamics
-        self._coupling = coupling
+        self._coupling, self._tree = coupling, tree
         self._data = model.createData()
         self._frames: dict[str, _Frame] = {}
         self.nv, self.nv_base = coupling.T.shape[1], nv_base
-        self._q = coupling.restrict(pin.neutral(model))
+        self._q, self._v = coupling.restrict(pin.neutral(model)), np.zeros(self.nv)
         self.terms = dynamics.allocate(tree)
         self._kept = keep(dynamics.Model(tree, self.terms))
         self.M, self.nle, self.momentum = self.terms.M, self.terms.nle, self.terms.momentum
@@ -55,14 +55,19 @@ class Workspace:
         self._weight = dynamics.GRAVITY * sum(inertia.mass for inertia in model.inertias[1:])
 
     def update(self, q: Array, v: Array) -> None:
-        """Evaluate everything at a configuration and velocity; q is kept, not copied.
+        """Evaluate everything at a configuration and velocity; both are kept, not copied.
 
         Args:
             q: (nq,) configuration.
             v: (nv,) velocity.
         """
-        self._q = q
+        self._q, self._v = q, v
         self._kernel.evaluate(self._kept, q, v)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what it is made of and where it was evaluated; memory is allocated anew."""
+        made_of = (self._model, self._coupling, self._tree, self.nv_base)
+        return _evaluated, (*made_of, self._q, self._v)
 
     @property
     def kinetic_energy(self) -> float:
@@ -160,3 +165,12 @@ class _Frame:
     mounts: "Mounts"
     terms: "Frames"
     kept: Any
+
+
+def _evaluated(
+    model: Any, coupling: Coupling, tree: "Tree", nv_base: int, q: Array, v: Array
+) -> Workspace:
+    """The workspace of a pickle."""
+    workspace = Workspace(model, coupling, tree, nv_base=nv_base)
+    workspace.update(q, v)
+    return workspace

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 FASTEST = 1e4  # rad/s, m/s: beyond any physical range
 _EVENTS_PER_STEP = 60
+_FASTEST_MOTOR = 1e6
+"""1/s: ten times more takes minutes for a second of a robot with 14 joints; robots' motors follow at
+1e3 1/s, their drives at 1e4 1/s."""
 _STABLE = 2.0  # swing of a link on its spring in a step, rad; Runge-Kutta is stable to 2.8
 _LOCATE = 40
 _NOWHERE = (0.0, 0, 0, 0)  # a raw cursor of no run
@@ -123,8 +126,8 @@ class Plant:
             theta_dot: Motor speeds (n,), rad/s; default the joint rates.
 
         Raises:
-            InputError: A foot begins inside the ground, no contact forces can hold the state, or
-                the step is too long for a light link on a stiff spring.
+            InputError: A foot begins inside the ground, no contact forces can hold the state, a
+                motor is too fast, or the step is too long for a light link on a stiff spring.
         """
         now, n = self.now, self.robot.n
         now.q[:], now.v[:] = q, v
@@ -135,6 +138,7 @@ class Plant:
         self.events.clear()
         self.surroundings.open_all()
         self._evaluate()
+        self.refuse_fast_motors()
         self.refuse_long_step()
         self.surroundings.refuse_buried(now)
         self.surroundings.measure_gaps(now)
@@ -146,6 +150,25 @@ class Plant:
             book[:] = 0.0
         self._update_stores()
         self.ledger.moved[0] = 0.0
+
+    def refuse_fast_motors(self) -> None:
+        """Refuse motors whose motion would take longer to compute than anybody waits.
+
+        Raises:
+            InputError: A motor's time constant is below a microsecond.
+        """
+        from sealag.kernels.motor import fastest_rates
+
+        rates = np.zeros(self.robot.n)
+        fastest_rates(tuple(motors_of(self.actuators)), self.held.instant, rates)
+        j = int(rates.argmax())
+        if not rates[j] <= _FASTEST_MOTOR:
+            raise InputError(
+                f"the motor of {self.robot.joints[j]} follows at {rates[j]:.2g} 1/s; at most "
+                f"{_FASTEST_MOTOR:g} 1/s is simulated: its rotor_inertia times inertia_shaping is "
+                "too small for motor_damping, spring_stiffness and spring_damping, or its "
+                "torque_bandwidth too high"
+            )
 
     def refuse_long_step(self) -> None:
         """Refuse a step that is too long for the springs and dampers where the robot is now.

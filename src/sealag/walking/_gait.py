@@ -1,10 +1,11 @@
 """What a walk should look like, and the periodic motion of the pendulum that walks so."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from sealag.constants import GRAVITY
 from sealag.errors import InputError
+from sealag.walking._ranged import check_ranges, ranged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,25 +53,20 @@ class WalkingGait:
         smallest_width: Footholds are never placed closer than this across, m.
 
     Raises:
-        InputError: A value is not a positive number, or the weight transfer fills the step.
+        InputError: A value is outside its range, or the weight transfer fills the step.
     """
 
-    apex_speed: float = 0.5
-    step_time: float = 0.35
-    transfer_time: float = 0.06
-    com_height: float = 0.86
-    step_width: float = 0.26
-    clearance: float = 0.08
-    foot_radius: float = 0.025
-    smallest_width: float = 0.12
+    apex_speed: float = ranged(0.5, 1e-4, 20.0, "m/s")
+    step_time: float = ranged(0.35, 0.05, 10.0, "s")
+    transfer_time: float = ranged(0.06, 1e-3, 6.0, "s")
+    com_height: float = ranged(0.86, 0.05, 20.0, "m")
+    step_width: float = ranged(0.26, 1e-3, 5.0, "m")
+    clearance: float = ranged(0.08, 1e-4, 5.0, "m")
+    foot_radius: float = ranged(0.025, 1e-6, 1.0, "m")
+    smallest_width: float = ranged(0.12, 1e-6, 5.0, "m")
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(
-                    f"The gait's {field.name} is {value}; it must be positive and finite."
-                )
+        check_ranges(self, "The gait's")
         if self.transfer_time > 0.6 * self.step_time:
             raise InputError(
                 f"The weight transfer of {self.transfer_time:g} s leaves too little of the step of "

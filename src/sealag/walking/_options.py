@@ -1,11 +1,10 @@
 """The means by which the walking controller works against the delay, and its gains."""
 
-import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Self
 
-from sealag.errors import InputError
+from sealag.walking._ranged import check_ranges, ranged
 
 
 class Prediction(StrEnum):
@@ -67,26 +66,26 @@ class WalkingOptions:
             q̄(θ) by one fixed-point iteration of Eq. (15) per tick.
 
     Raises:
-        InputError: A gain is negative or not finite.
+        InputError: A number is outside its range.
     """
 
     preview: bool = True
-    embedded_delay: float = 0.0025
+    embedded_delay: float = ranged(0.0025, 0.0, 1.0, "s")
     prediction: Prediction = Prediction.MODEL
     acceleration_feedforward: bool = True
     velocity_feedforward: bool = True
-    position_rate: float = 10.0
+    position_rate: float = ranged(10.0, 0.0, 1e4, "1/s")
     lead: bool = True
-    lead_time: float = 0.005
-    torque_feedback: float = 1.0
-    task_damping: float = 0.5
-    height_stiffness: float = 100.0
-    posture_stiffness: float = 100.0
-    swing_stiffness: float = 400.0
+    lead_time: float = ranged(0.005, 1e-6, 10.0, "s")
+    torque_feedback: float = ranged(1.0, 0.0, 1e3)
+    task_damping: float = ranged(0.5, 0.0, 1e3)
+    height_stiffness: float = ranged(100.0, 0.0, 1e6, "1/s²")
+    posture_stiffness: float = ranged(100.0, 0.0, 1e6, "1/s²")
+    swing_stiffness: float = ranged(400.0, 0.0, 1e6, "1/s²")
     momentum_placement: bool = True
-    bias_gain: float = 0.3
-    placement_time: float = 0.05
-    placement_freeze: float = 0.03
+    bias_gain: float = ranged(0.3, 0.0, 10.0)
+    placement_time: float = ranged(0.05, 0.0, 10.0, "s")
+    placement_freeze: float = ranged(0.03, 0.0, 10.0, "s")
     early_contact: bool = True
     odometry: bool = True
     feedback: JointAngles = JointAngles.JOINT
@@ -94,14 +93,7 @@ class WalkingOptions:
     def __post_init__(self) -> None:
         object.__setattr__(self, "prediction", Prediction(self.prediction))
         object.__setattr__(self, "feedback", JointAngles(self.feedback))
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, float) and not (math.isfinite(value) and value >= 0.0):
-                raise InputError(
-                    f"The walking option {field.name} is {value}; 0 or a positive number is right."
-                )
-        if self.lead_time == 0.0:
-            raise InputError("The lead_time must be positive; leave the lead out with lead=False.")
+        check_ranges(self, "The walking option")
 
     def published(self, **changes: Any) -> Self:
         """Return the law of Eqs. (11) and (17) with plain D_θ θ̇: position feedback and gravity.

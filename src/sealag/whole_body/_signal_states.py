@@ -72,7 +72,6 @@ class LawDerivative:
             C_q=C_q, C_theta=C_theta,
         )  # fmt: skip
 
-
     def change(self, other: "LawDerivative") -> float:
         """Return how far another derivative of the same law lies from this one, as a share of it.
 
