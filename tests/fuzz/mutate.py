@@ -4,12 +4,17 @@ import copy
 import re
 import types
 import typing
+from pathlib import Path
 from random import Random
 from typing import Any
 
 from pydantic import BaseModel
 
-from sealag.design._schema import Project
+from sealag.design import parse_project
+
+_HUME = Path(__file__).resolve().parents[2] / "src" / "sealag" / "data" / "hume.toml"
+PROJECT = type(parse_project(_HUME.read_bytes(), _HUME))
+"""The schema's class of a whole project."""
 
 NUMBERS = (
     0.0, -0.0, 1.0, -1.0, 0.3, 2, 7, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 10.0, 60.0, 100.0, 1e3,
@@ -43,7 +48,7 @@ def _choices(annotation: Any) -> list[Any]:
     )
 
 
-def places(data: Any, model: type[BaseModel] | None = Project) -> list[tuple[Any, Any, list[Any]]]:
+def places(data: Any, model: type[BaseModel] | None = PROJECT) -> list[tuple[Any, Any, list[Any]]]:
     """Every place of a project: its container, its key or index, and words that it may hold.
 
     Keys of the schema that the project leaves out are places too.
@@ -73,19 +78,38 @@ def _fits(model: type[BaseModel], value: Any) -> bool:
     return isinstance(value, dict) and any(key in model.model_fields for key in value)
 
 
+def _value(place: tuple[Any, Any, list[Any]]) -> Any:
+    container, key, _ = place
+    if isinstance(container, list):
+        return container[key] if key < len(container) else None
+    return container.get(key)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _scaled(data: dict[str, Any], random: Random) -> dict[str, Any]:
+    """A project with some of its numbers scaled, most of them within their ranges."""
+    for _ in range(random.choice((1, 2, 3))):
+        container, key, _ = random.choice([one for one in places(data) if _is_number(_value(one))])
+        by = random.choice((-1, 0.3, 3, 0.1, 10, 0.01, 100, 1e-3, 1e3, 1e-6, 1e6))
+        container[key] = container[key] * by or by
+    return data
+
+
 def mutated(project: dict[str, Any], random: Random, words: list[str]) -> dict[str, Any]:
     """A copy of a project with one to three keys changed, left out or doubled."""
     data = copy.deepcopy(project)
+    if random.random() < 0.5:
+        return _scaled(data, random)
     for _ in range(random.choice((1, 1, 1, 2, 3))):
-        container, key, choices = random.choice(places(data))
-        if isinstance(container, list) and key >= len(container):
-            continue
-        now = container[key] if isinstance(container, list) else container.get(key)
-        match random.choice(("number", "number", "scaled", "text", "word", "drop", "shape")):
+        place = random.choice(places(data))
+        container, key, choices = place
+        now = _value(place)
+        match random.choice(("number", "number", "text", "word", "drop", "shape")):
             case "number":
                 container[key] = random.choice(NUMBERS)
-            case "scaled" if isinstance(now, int | float) and not isinstance(now, bool):
-                container[key] = now * random.choice((-1, 1e-6, 1e-3, 0.1, 10, 1e3, 1e6))
             case "text":
                 container[key] = random.choice(TEXTS)
             case "word":
@@ -97,13 +121,19 @@ def mutated(project: dict[str, Any], random: Random, words: list[str]) -> dict[s
     return data
 
 
+_NUMBERS = re.compile(r"[-+.\deE ]*\d[-+.\deE ]*")
 _ATTRIBUTE = re.compile(r'(\w+)="([^"]*)"')
 
 
 def mutated_urdf(text: str, random: Random) -> str:
     """A URDF with one to three attributes changed, or an element cut out or doubled."""
     for _ in range(random.choice((1, 1, 2, 3))):
-        match random.choice(("attribute", "attribute", "attribute", "cut", "double", "chop")):
+        match random.choice(("scale", "scale", "scale", "attribute", "cut", "double", "chop")):
+            case "scale":
+                found = [one for one in _ATTRIBUTE.finditer(text) if _NUMBERS.fullmatch(one[2])]
+                one, by = random.choice(found), random.choice((-1, 0.1, 0.5, 2, 10, 1e-3, 1e3, 1e6))
+                value = " ".join(str(float(word) * by) for word in one[2].split())
+                text = f'{text[: one.start()]}{one[1]}="{value}"{text[one.end() :]}'
             case "attribute":
                 found = list(_ATTRIBUTE.finditer(text))
                 if not found:

@@ -84,33 +84,36 @@ def design(seed: int, folder: Path, *, slow: bool = False) -> Path:
     return path
 
 
+def _stages(path: Path):
+    """Name and call of every stage, in order; none follows a load that is refused."""
+    system = None
+
+    def load():
+        nonlocal system
+        system = sealag.load(path)
+
+    yield "load", load
+    if system is not None:
+        yield "certify", lambda: sealag.certify(system)
+        yield "margin", lambda: local_margins(system)
+        yield "simulate", lambda: sealag.simulate(system, duration=0.05)
+
+
 def tried(path: Path, seed: int) -> Finding | None:
     """Take a design through every stage; what it must not do is a finding."""
-    stage, system = "load", None
-    try:
-        for stage, call in (
-            ("load", lambda: sealag.load(path)),
-            ("certify", lambda: sealag.certify(system)),
-            ("margin", lambda: local_margins(system)),
-            ("simulate", lambda: sealag.simulate(system, duration=0.05)),
-        ):
-            try:
-                with limited(LIMIT):
-                    answer = call()
-                system = answer if stage == "load" else system
-            except SealagError as error:
-                if not str(error).strip():
-                    return Finding(seed, stage, f"{type(error).__name__} without a sentence")
-                if stage == "load":
-                    return None
-    except EndlessError:
-        return Finding(seed, stage, f"longer than {LIMIT} s")
-    except Exception as error:
-        last = traceback.extract_tb(error.__traceback__)[-1]
-        ours = [
-            one for one in traceback.extract_tb(error.__traceback__) if "sealag" in one.filename
-        ]
-        at = ours[-1] if ours else last
-        where = f"{Path(at.filename).name}:{at.lineno}"
-        return Finding(seed, stage, f"{type(error).__name__} at {where}: {str(error)[:200]}")
+    for stage, call in _stages(path):
+        try:
+            with limited(LIMIT):
+                call()
+        except SealagError as error:
+            if not str(error).strip():
+                return Finding(seed, stage, f"{type(error).__name__} without a sentence")
+        except EndlessError:
+            return Finding(seed, stage, f"longer than {LIMIT} s")
+        except Exception as error:
+            frames = traceback.extract_tb(error.__traceback__)
+            ours = [one for one in frames if "sealag" in one.filename]
+            at = (ours or frames)[-1]
+            where = f"{Path(at.filename).name}:{at.lineno}"
+            return Finding(seed, stage, f"{type(error).__name__} at {where}: {str(error)[:200]}")
     return None

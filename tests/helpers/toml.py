@@ -1,6 +1,7 @@
 """Project files as text."""
 
 import json
+import math
 from typing import Any
 
 
@@ -21,4 +22,6 @@ def _value(value: Any) -> str:
         return "{" + ", ".join(inside) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)  # nan, inf, -inf
     return json.dumps(value)

@@ -110,7 +110,8 @@ def test_many_writers_at_once_leave_one_whole_file(tmp_path):
         if path.exists():
             seen.add(path.read_text())
     assert [writer.exitcode for writer in writers] == [0, 0, 0]
-    assert seen and seen <= set(texts)
+    assert seen
+    assert seen <= set(texts)
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
@@ -121,7 +122,8 @@ def test_links_modes_and_the_umask_are_respected(tmp_path):
     target.chmod(0o600)
     link.symlink_to(target)
     write_text(link, "new")
-    assert link.is_symlink() and target.read_text() == "new"
+    assert link.is_symlink()
+    assert target.read_text() == "new"
     assert target.stat().st_mode & 0o777 == 0o600
     before = os.umask(0o027)
     try:

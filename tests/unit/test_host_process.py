@@ -47,7 +47,8 @@ def test_threads_may_share_a_design():
 
     def terms(q):
         return [
-            (at.M.copy(), at.com.copy()) for at in (system.robot.workspace_at(q) for _ in range(300))
+            (at.M.copy(), at.com.copy())
+            for at in (system.robot.workspace_at(q) for _ in range(300))
         ]
 
     alone = [terms(q)[0] for q in postures]

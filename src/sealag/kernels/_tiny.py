@@ -145,8 +145,8 @@ def _step() -> None:
         np.eye(3)[None], parts.contacts.closed, 1.0, three, np.zeros(1), three.copy()
     )
     plant.sense(kept, 0.0, np.zeros(1 + _NQ + _NV + 3 + 2))
+    plant.fastest_motors(kept, np.zeros(1))
     motor.rate_rows(tuple(parts.motors), True, np.zeros((6, 1)), np.zeros((6, 1)))
-    motor.fastest_rates(tuple(parts.motors), True, np.zeros(1))
     start = (0.0, 0, 0, run.WATCH)
     run.drive(kept, keep(run.idle(1)), plant.STORE, 1e-3, parts.contacts.closed, three, start, 1.0)
 

@@ -176,7 +176,7 @@ def rate_rows(raw_motors, instant, speed, torque):
 
 
 @inner
-def _fastest(motors, j, instant, limited):
+def fastest(motors, j, instant, limited):
     """Return a bound of the rate at which joint j's equation moves the rotor's state, 1/s.
 
     A norm of its matrix with angles scaled by the rotor's own frequency.
@@ -284,20 +284,6 @@ def _integrate(series, order, link, t, works):
     return Works(squared, port, shaft, slip, motor)
 
 
-@entry
-def fastest_rates(raw_motors, instant, out):
-    """Write a bound of the rate at which each rotor's state moves within limits (n,), 1/s.
-
-    Args:
-        raw_motors: all joints.
-        instant: whether torque feedback is not delayed.
-        out: (n,), written.
-    """
-    motors = Motors(*raw_motors)
-    for j in range(len(out)):
-        out[j] = _fastest(motors, j, instant, False)
-
-
 @shared
 def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     """Move rotor j along its link's cubic while its drive does one thing.
@@ -316,7 +302,7 @@ def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     Returns:
         The rotor at the end, and its works.
     """
-    reach = _fastest(motors, j, instant, drive.limited) * span
+    reach = fastest(motors, j, instant, drive.limited) * span
     pieces = max(1, math.ceil(reach / _REACH))
     t, order, works = span / pieces, _order(reach / pieces), Works(0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(pieces):
@@ -381,7 +367,7 @@ def _reversal(motors, j, instant, drive, rotor, link, time, series):
 def predict(motors, j, held, rotor, link, step, series):
     """Return rotor j half a step and a step ahead along its link's motion."""
     drive, _, rotor = choose(motors, j, held, rotor, link)
-    reach = _fastest(motors, j, held.instant, drive.limited) * step
+    reach = fastest(motors, j, held.instant, drive.limited) * step
     if reach <= _REACH:
         order = _order(reach)
         whole = _expand(motors, j, held.instant, drive, rotor, link, step, order, series)

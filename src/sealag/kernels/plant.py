@@ -264,3 +264,11 @@ def act(physics, what, touching, impulse):
 def sense(kept, t, row):
     """Write what the sensors measure now of `Physics`, see `contact.write_measurement`."""
     write_measurement(kept.parts.now, kept.parts.plant.contacts, t, row)
+
+
+@entry
+def fastest_motors(kept, out):
+    """Write bounds of the rates at which the rotors of `Physics` move within limits (n,), 1/s."""
+    physics = kept.parts
+    for j in range(len(out)):
+        out[j] = motor.fastest(physics.plant.motors, j, physics.held.instant, False)

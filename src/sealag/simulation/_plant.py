@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 FASTEST = 1e4  # rad/s, m/s: beyond any physical range
 _EVENTS_PER_STEP = 60
 _FASTEST_MOTOR = 1e6
-"""1/s: ten times more takes minutes for a second of a robot with 14 joints; robots' motors follow at
-1e3 1/s, their drives at 1e4 1/s."""
+"""1/s: ten times more takes minutes for a second of a robot with 14 joints; motors of robots
+follow at 1e3 1/s, their drives at 1e4 1/s."""
 _STABLE = 2.0  # swing of a link on its spring in a step, rad; Runge-Kutta is stable to 2.8
 _LOCATE = 40
 _NOWHERE = (0.0, 0, 0, 0)  # a raw cursor of no run
@@ -157,10 +157,8 @@ class Plant:
         Raises:
             InputError: A motor's time constant is below a microsecond.
         """
-        from sealag.kernels.motor import fastest_rates
-
         rates = np.zeros(self.robot.n)
-        fastest_rates(tuple(motors_of(self.actuators)), self.held.instant, rates)
+        self._kernel.fastest_motors(self._physics, rates)
         j = int(rates.argmax())
         if not rates[j] <= _FASTEST_MOTOR:
             raise InputError(
