@@ -8,6 +8,7 @@ import difflib
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from typing import TypeVar
+from unicodedata import normalize
 
 
 class SealagError(Exception):
@@ -62,6 +63,12 @@ def near(name: str, known: Iterable[str], *, what: str) -> UnknownNameError:
         what: such as "joint" or "frame".
     """
     known = list(known)
+    for other in known:
+        if normalize("NFC", name) == normalize("NFC", other):
+            return UnknownNameError(
+                f"The {what} {name!r} is written with other characters than the {other!r} there is "
+                f"({name!a} and {other!a}), which only look alike; copy the name."
+            )
     matches = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
     hint = f"did you mean {either(matches)}?" if matches else f"there is {either(known[:12])}."
     return UnknownNameError(f"No {what} is called {name!r}; {hint}")

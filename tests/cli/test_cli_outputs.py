@@ -1,11 +1,13 @@
 """Outputs of commands that meet: none is lost, mixed or half."""
 
+import json
 import shutil
 import signal
 import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 from helpers.designs import EXAMPLES
@@ -63,3 +65,35 @@ def test_two_starters_at_once_make_one(tmp_path):
     assert sorted(one.returncode for one in both) == [0, 2]
     assert any("exists already" in err or "being written" in err for err in errors)
     assert [path.name for path in tmp_path.iterdir()] == ["p.toml"]
+
+
+def test_a_longer_log_period_leaves_rows_out_and_changes_none(tmp_path, cli):
+    found = []
+    for period in (None, "20"):
+        out = tmp_path / f"{period}.mcap"
+        options = () if period is None else ("--log-ms", period)
+        words = ("--duration", "0.2", "--scenario", "track", *options, "--json", "--out", out)
+        code, text, _ = cli("simulate", EXAMPLES / "anymal.toml", *words)
+        assert code == 0
+        found.append((json.loads(text), read_recording(out).signals["/joint_states"]))
+    (every, rows), (seldom, few) = found
+    assert (len(rows.time), len(few.time)) == (81, 11)
+    np.testing.assert_array_equal(few.values, rows.values[::8])
+    assert seldom["energy_throughput_j"] == every["energy_throughput_j"]
+    assert seldom["joint_side_passive"] == every["joint_side_passive"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--duration", "1e6"), "log less often (simulation.log_period_ms, --log-ms)"),
+        (("--log-ms", "-1"), "--log-ms is -1; it must be more than 0"),
+        (("--log-ms", "3.3"), "must be a whole multiple of the physics step"),
+    ],
+)
+def test_logs_that_cannot_be_are_refused(options, words, tmp_path, cli):
+    out = tmp_path / "r.mcap"
+    code, text, err = cli("simulate", EXAMPLES / "anymal.toml", *options, "--out", out)
+    assert (code, text) == (2, "")
+    assert words in err
+    assert not out.exists()

@@ -121,8 +121,14 @@ def mutated(project: dict[str, Any], random: Random, words: list[str]) -> dict[s
     return data
 
 
-_NUMBERS = re.compile(r"[-+.\deE ]*\d[-+.\deE ]*")
 _ATTRIBUTE = re.compile(r'(\w+)="([^"]*)"')
+
+
+def _is_numbers(text: str) -> bool:
+    try:
+        return bool([float(word) for word in text.split()])
+    except ValueError:
+        return False
 
 
 def mutated_urdf(text: str, random: Random) -> str:
@@ -130,7 +136,9 @@ def mutated_urdf(text: str, random: Random) -> str:
     for _ in range(random.choice((1, 1, 2, 3))):
         match random.choice(("scale", "scale", "scale", "attribute", "cut", "double", "chop")):
             case "scale":
-                found = [one for one in _ATTRIBUTE.finditer(text) if _NUMBERS.fullmatch(one[2])]
+                found = [one for one in _ATTRIBUTE.finditer(text) if _is_numbers(one[2])]
+                if not found:
+                    continue
                 one, by = random.choice(found), random.choice((-1, 0.1, 0.5, 2, 10, 1e-3, 1e3, 1e6))
                 value = " ".join(str(float(word) * by) for word in one[2].split())
                 text = f'{text[: one.start()]}{one[1]}="{value}"{text[one.end() :]}'

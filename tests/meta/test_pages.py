@@ -15,7 +15,8 @@ ROOTS = ("src/", "tests/", "docs/", "examples/", "bench/", "studies/", ".ci/", "
 def named_paths(text: str) -> set[str]:
     """Return the repository's paths that a page names in code or links to."""
     code = re.findall(r"`([^`\n]+)`", text)
-    return {word.rstrip("/") for part in code for word in part.split() if word.startswith(ROOTS)}
+    words = [word for part in code for word in part.split() if word.startswith(ROOTS)]
+    return {word.partition("::")[0].rstrip("/") for word in words}
 
 
 def named_commands(text: str) -> set[str]:

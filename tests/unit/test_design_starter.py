@@ -83,7 +83,7 @@ def test_commented_keys_are_the_schema_s_with_its_defaults():
     given = filled("\n".join(lines[start:]))
     assert given.controller == plain.controller
     assert given.delays == plain.delays
-    stated = {"physics_step_ms", "torsional_radius", "pushes"}
+    stated = {"physics_step_ms", "log_period_ms", "torsional_radius", "pushes"}
     assert given.simulation.model_dump(exclude=stated) == plain.simulation.model_dump(
         exclude=stated
     )

@@ -200,6 +200,14 @@ def simulate(
     delay_scale: Annotated[
         float, typer.Option("--delay-scale", help="Factor on both round trips.")
     ] = 1.0,
+    log_ms: Annotated[
+        float | None,
+        typer.Option(
+            "--log-ms",
+            help="Time between two logged instants. Default: simulation.log_period_ms, or the "
+            "controller's period.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Recording to write. Default: PROJECT.mcap.")
     ] = None,
@@ -214,6 +222,7 @@ def simulate(
         duration=duration,
         seed=seed,
         delay_scale=delay_scale,
+        log_ms=log_ms,
         out=out,
         as_json=as_json,
     )

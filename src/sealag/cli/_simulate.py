@@ -16,7 +16,10 @@ from sealag.errors import InputError
 from sealag.files import Draft, check_output
 from sealag.report import run_summary, write_run
 from sealag.simulation import MeasuredGait, Outcome, Run
+from sealag.units import seconds_from_ms
 from sealag.version import __version__
+
+LONGEST_LOG_MS = 1e6
 
 T = TypeVar("T")
 Progress = Callable[[float], None]
@@ -29,6 +32,7 @@ def simulate_project(
     duration: float | None,
     seed: int | None,
     delay_scale: float,
+    log_ms: float | None,
     out: Path | None,
     as_json: bool,
 ) -> None:
@@ -43,6 +47,11 @@ def simulate_project(
         system.delays.scaled(delay_scale)
     except InputError as error:
         raise InputError(f"--delay-scale is {delay_scale:g}: {error}") from error
+    if log_ms is not None and not 0.0 < log_ms <= LONGEST_LOG_MS:
+        raise InputError(
+            f"--log-ms is {log_ms:g}; it must be more than 0 and at most {LONGEST_LOG_MS:g}."
+        )
+    log_period = None if log_ms is None else seconds_from_ms(log_ms)
     with Draft(path) as draft:
         compile_kernels()
         run = _with_progress(
@@ -54,6 +63,7 @@ def simulate_project(
                 duration=length,
                 seed=seed,
                 delay_scale=delay_scale,
+                log_period=log_period,
                 progress=progress,
             ),
         )

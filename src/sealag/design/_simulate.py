@@ -23,6 +23,7 @@ from sealag.simulation import (
     fastest_link,
 )
 from sealag.typing import Array
+from sealag.units import seconds_from_ms
 from sealag.walking import GroundProfile, Walking, begin_walk
 from sealag.whole_body import Controller, TaskKind, TickController
 
@@ -47,6 +48,7 @@ def simulate(
     duration: float | None = None,
     seed: int | None = None,
     delay_scale: float = 1.0,
+    log_period: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Run a design's whole-body controller on the delayed robot, with contacts and energy audit.
@@ -64,6 +66,8 @@ def simulate(
         duration: s; the project's, or the walk's, if None.
         seed: of jitter and losses; the project's if None.
         delay_scale: factor on both round trips.
+        log_period: time between two logged instants, s; the project's, or the controller's period,
+            if None.
         progress: called with the simulated time.
 
     Returns:
@@ -83,7 +87,9 @@ def simulate(
     length = scenario_duration(system, kind) if duration is None else duration
     if not (isinstance(length, int | float) and 0.0 < length <= LONGEST_RUN):
         raise InputError(f"The duration is {length!r} s; it must be more than 0, at most 1e9 s.")
-    clock = _clock(system)
+    if log_period is None and setting.log_period_ms is not None:
+        log_period = seconds_from_ms(setting.log_period_ms)
+    clock = replace(_clock(system), log=log_period)
     _check_pushes(system, length)
     common = {
         "duration": length,

@@ -70,6 +70,7 @@ OPTIONAL = """\
 # scenario = "regulate"        # regulate | track | drop | balance | walk
 # duration_s = 2.0
 # physics_step_ms = 0.5        # as fine as the fastest spring needs, at most 1, if left out
+# log_period_ms = 20.0         # between two logged instants; the controller's period if left out
 # friction = 0.8               # of the ground
 # foot_radius = 0.0            # m
 # foot_half_length = 0.1       # m, of surfaces

@@ -41,10 +41,12 @@ def compile_all(progress: Callable[[str], None], *, missing_only: bool = False) 
 
 
 def compiled() -> bool:
-    """Return whether every kernel is in the cache."""
+    """Return whether nothing is left to compile beforehand: every kernel is in the cache, or there
+    is none, so that each process compiles what it needs."""
+    from sealag.kernels._jit import KEPT_ON_DISK
     from sealag.kernels._tiny import entries
 
-    return all(_cached(name) for name, _ in entries())
+    return not KEPT_ON_DISK or all(_cached(name) for name, _ in entries())
 
 
 def _cached(name: str) -> bool:

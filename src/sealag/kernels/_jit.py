@@ -6,6 +6,7 @@ take most of the compilation. It counts no references, for that costs more than 
 so it can neither allocate nor return new arrays: memory comes from Python, see `keep`.
 """
 
+import warnings
 from typing import Any
 
 from numba import njit, types
@@ -72,7 +73,26 @@ _INNER: dict[str, Any] = {
     "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _Inlined, "_nrt": False,
 }  # fmt: skip
 
-_ENTRY: dict[str, Any] = {"cache": True, "no_cfunc_wrapper": True}
+
+def _kept_on_disk() -> bool:
+    """Whether Numba finds a folder for its cache; says so once if it does not."""
+    try:
+        njit(cache=True)(_kept_on_disk)
+    except RuntimeError:
+        warnings.warn(
+            "sealag's kernels cannot be kept: no folder for Numba's cache can be written, so that "
+            "they are compiled anew in each process, for minutes; set NUMBA_CACHE_DIR to one",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return False
+    return True
+
+
+KEPT_ON_DISK = _kept_on_disk()
+"""Whether a kernel that is compiled is there for the next process."""
+
+_ENTRY: dict[str, Any] = {"cache": KEPT_ON_DISK, "no_cfunc_wrapper": True}
 
 entry = njit(**_ENTRY)
 """Called from Python, and kept on disk with all that it calls."""

@@ -90,6 +90,6 @@ def refuse_large(rows: int, numbers: int) -> None:
     if size > LARGEST_LOG_BYTES:
         raise InputError(
             f"The run would record {rows:.4g} instants in {size / 1e9:.4g} GB of memory, more "
-            f"than {LARGEST_LOG_BYTES / 1e9:g} GB; simulate for a shorter time, or with longer "
-            "periods (delays.sample_time_ms, simulation.physics_step_ms)."
+            f"than {LARGEST_LOG_BYTES / 1e9:g} GB; log less often (simulation.log_period_ms, "
+            "--log-ms), or simulate for a shorter time."
         )
