@@ -4,13 +4,14 @@ BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help setup paper test quick fuzz bench lint wheel wheel-check clean
+.PHONY: help setup paper test quick fuzz mutants bench lint wheel wheel-check clean
 
 help:
 	@echo "make paper   compute the paper's figures and claims into out/paper/"
 	@echo "make test    lint, types, import boundaries and the whole test suite"
 	@echo "make quick   the same without the tests marked slow"
 	@echo "make fuzz    fresh mutations of projects and robots for MINUTES=60, any SEED=n"
+	@echo "make mutants falsify answers one by one, and see that a test notices (an hour); ROOM=delay for one room"
 	@echo "make wheel-check  build sdist and wheel, install and use the wheel in a fresh environment"
 	@echo "make bench   certificates and control ticks beside their peers, as ratios"
 	@echo "make setup   build .venv only (the other commands do this by themselves)"
@@ -50,6 +51,9 @@ quick: lint
 MINUTES ?= 60
 fuzz: setup
 	PYTHONPATH=tests $(BIN)/python -W ignore -m fuzz --minutes $(MINUTES) $(if $(SEED),--seed $(SEED))
+
+mutants: setup
+	PYTHONPATH=tests $(BIN)/python -m mutants $(if $(ROOM),--room $(ROOM))
 
 # The wheel is built from the sdist, so that both are known to be complete.
 wheel:

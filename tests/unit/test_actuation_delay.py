@@ -83,6 +83,7 @@ def test_ways_need_not_be_alike():
     assert delays.d_1 == pytest.approx(0.010)
     assert delays.d_2 == pytest.approx(0.008)
     assert delays.central.mean == pytest.approx(0.009)
+    assert delays.central.at(0.3) == pytest.approx(0.009)
     assert delays.scaled(2.0).d_1 == pytest.approx(0.020)
 
 
@@ -102,6 +103,18 @@ def test_jitter_and_losses_count():
         Delays(**plain, embedded_period=0.003)
     with pytest.raises(InputError, match="factor"):
         looks.scaled(-1.0)
+
+
+def test_late_torque_feedback_waits_for_its_own_way_up():
+    """Its packets leave and are looked for once an embedded period: two waits."""
+    up = Link(delay=Constant(0.003), jitter=0.001, loss=0.1, max_burst=2)
+    embedded = RoundTrip(up=up, down=Link(delay=Constant(0.05)))
+    plain = {"central": Constant(0.0), "embedded": embedded, "sample_time": 0.01}
+    late = Delays(**plain, embedded_period=0.002, delayed_torque_feedback=True)
+    assert late.torque_feedback_delay == pytest.approx(0.003 + 0.001 + 2 * 0.002 + 2 * 0.002)
+    at_once = Delays(**plain, delayed_torque_feedback=True)
+    assert at_once.torque_feedback_delay == pytest.approx(0.003 + 0.001 + 2 * 0.01)
+    assert Delays(**plain).torque_feedback_delay is None
 
 
 def test_every_part_of_d_1_and_d_2_counts_once():
@@ -169,7 +182,7 @@ def test_packets_taken_as_they_come_count_as_overtaken():
 
 def test_bounds_of_every_signal():
     table = Table(time=np.array([0.0, 1.0, 3.0]), delay=np.array([0.01, 0.03, 0.01]))
-    wave = Sinusoid(mean=0.02, amplitude=0.01, angular_frequency=-3.0)
+    wave = Sinusoid(mean=0.02, amplitude=0.01, angular_frequency=-3.0, phase=0.4)
     trip = RoundTrip(up=Link(delay=table), down=Link(delay=wave)).scaled(2.0)
     for signal, lower, upper, fall in (
         (Constant(0.02), 0.02, 0.02, 0.0),
@@ -182,6 +195,8 @@ def test_bounds_of_every_signal():
         assert signal.steepest_fall == pytest.approx(fall)
         t = np.linspace(-1.0, 4.0, 5001)
         values = signal.at(t)
+        if signal is wave:
+            np.testing.assert_allclose(values, 0.02 + 0.01 * np.sin(0.4 - 3.0 * t), atol=1e-15)
         assert lower - 1e-12 <= values.min() <= values.max() <= upper + 1e-12
         assert np.diff(values).min() / (t[1] - t[0]) >= -fall - 1e-9
 
@@ -193,10 +208,22 @@ def test_table_and_samples():
     assert table.at(0.5) == pytest.approx(0.02)
     samples = Table.measured([0.01, 0.02, 0.5], period=0.1, quantile=0.5)
     assert samples.upper_bound == pytest.approx(0.02)
+    assert samples.left_out == pytest.approx(1.0 / 3.0)
     assert Table.measured([0.01, 0.02, 0.5], period=0.1).upper_bound == 0.5
 
 
+def test_overtaking_is_bounded_by_the_spread():
+    """A delay that falls almost as fast as time passes lets packets arrive together."""
+    for fall, overtaken in ((0.5, 0.004 / 0.5), (0.9, 0.004 + 0.02), (1.5, 0.004 + 0.02)):
+        wave = Sinusoid(mean=0.02, amplitude=0.01, angular_frequency=fall / 0.01)
+        link = Link(delay=wave, jitter=0.004, order=PacketOrder.ARRIVAL)
+        assert link.overtaken == pytest.approx(overtaken)
+        assert replace(link, order=PacketOrder.NEWEST).overtaken == 0.0
+
+
 def test_bad_delays_are_refused():
+    with pytest.raises(InputError, match="add up to d_1 = 6 s"):
+        Delays(central=Constant(4.0), embedded=Constant(4.0))
     with pytest.raises(InputError, match="ms meant"):
         Constant(20.0)
     with pytest.raises(InputError, match="negative"):

@@ -147,6 +147,14 @@ class TestSentAtEveryInstant:
         assert np.mean(ages > 1e-3) == pytest.approx(0.3, abs=0.05)
 
 
+    @pytest.mark.parametrize("order", ["fifo", "newest", "arrival"])
+    def test_states_grow_older_only_where_packets_are_taken_as_they_come(self, order):
+        looks = PERIOD * np.arange(500)
+        link = Link(delay=Constant(5e-3), jitter=4 * PERIOD, order=order)
+        sent = link.sent(looks, np.random.default_rng(0))
+        assert (np.diff(sent).min() < 0.0) == (order == "arrival")
+
+
 def test_a_longer_run_begins_like_a_shorter_one():
     link = Link(delay=Constant(1e-3), jitter=1e-3, loss=0.4, max_burst=2)
     times = PERIOD * np.arange(5000)

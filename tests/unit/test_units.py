@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from sealag.units import time_text
+from sealag.errors import InputError
+from sealag.units import check_delay_s, seconds_from_ms, time_text
 
 
 @pytest.mark.parametrize(
@@ -26,3 +27,15 @@ from sealag.units import time_text
 )
 def test_a_time_has_its_unit_and_digits_that_say_something(seconds, text):
     assert time_text(seconds) == text
+
+
+def test_milliseconds_are_thousandths_of_a_second():
+    assert seconds_from_ms(8.0) == pytest.approx(0.008)
+
+
+@pytest.mark.parametrize(("value", "words"), [(8.0, "8 ms meant"), (-1.0, "negative"), (6.0, "ms")])
+def test_a_delay_that_cannot_be_one_is_refused(value, words):
+    """5 s is a satellite link; 8 s is 8 ms, written so."""
+    assert check_delay_s(5.0, "The delay") == 5.0
+    with pytest.raises(InputError, match=words):
+        check_delay_s(value, "The delay")
