@@ -5,7 +5,8 @@ from dataclasses import dataclass
 TESTS = {
     "delay": "tests/unit/test_delay_link.py tests/unit/test_actuation_delay.py "
              "tests/unit/test_design_network.py tests/unit/test_simulation_exchange.py",
-    "actuation": "tests/unit/test_actuation_delay.py tests/unit/test_whole_body_frozen.py "
+    "actuation": "tests/unit/test_actuation_delay.py tests/unit/test_actuation_of_robot.py "
+                 "tests/unit/test_whole_body_frozen.py "
                  "tests/reference/test_kernels_motor.py",
     "law": "tests/unit/test_whole_body_spaces.py tests/unit/test_whole_body_frozen.py "
            "tests/unit/test_whole_body_law.py tests/unit/test_whole_body_signals.py "

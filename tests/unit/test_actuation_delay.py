@@ -28,6 +28,9 @@ def test_bandwidth_is_where_half_the_power_passes():
     gain = np.abs(K / (B_s * s**2 + D * s + K))
     np.testing.assert_allclose(gain, np.sqrt(0.5), rtol=1e-12)
     assert answer.bandwidth[0] > answer.bandwidth[1], "damping costs bandwidth"
+    np.testing.assert_allclose(answer.damping_ratio, D / (2.0 * np.sqrt(K * B_s)), rtol=1e-12)
+    critical = actuators(["a"], **{**SPRING, "motor_damping": 2.0 * np.sqrt(350.0 * 0.09)})
+    assert transparency(critical).damping_ratio[0] == pytest.approx(1.0)
     slow = transparency(joint, delay=0.02)
     np.testing.assert_allclose(slow.phase_lag - answer.phase_lag, 2 * np.pi * 0.01, rtol=1e-9)
 

@@ -146,7 +146,6 @@ class TestSentAtEveryInstant:
         assert 2 * PERIOD < ages.max() <= 1e-3 + 2 * PERIOD + 1e-12
         assert np.mean(ages > 1e-3) == pytest.approx(0.3, abs=0.05)
 
-
     @pytest.mark.parametrize("order", ["fifo", "newest", "arrival"])
     def test_states_grow_older_only_where_packets_are_taken_as_they_come(self, order):
         looks = PERIOD * np.arange(500)

@@ -141,3 +141,14 @@ def test_roots_confirm_the_margin_beside_a_slow_crossing() -> None:
     assert below.real < 0.0
     assert above.real == pytest.approx(0.0, abs=1e-8)
     assert abs(above.imag) == pytest.approx(answer.frequency, rel=1e-8)
+
+
+def test_a_slow_crossing_ends_a_stable_range():
+    """ẋ = a x − x(t − d), a = 1 − 1e-8: after 1 s, at a turn of 1.4e-4 rad, which is no zero root."""
+    a = 1.0 - 1e-8
+    omega = math.sqrt((1.0 - a) * (1.0 + a))
+    answer = delay_margin([[a]], [[-1.0]], horizon=3.0)
+    assert answer.delay == pytest.approx(math.atan2(omega, a) / omega, rel=1e-7)
+    assert [one.unstable_roots for one in answer.intervals] == [0, 2]
+    assert answer.intervals[0].upper == answer.delay
+    assert answer.intervals[1].upper == 3.0

@@ -11,9 +11,11 @@ from sealag.walking import GroundProfile, plan_walk, walk_motion
 HUME = load_robot("bundled:hume.urdf", floating_base=True)
 FEET = ("left_foot", "right_foot")
 VARIED = {"apex_speed": [0.6, 0.55, 0.62, 0.6], "step_length": [0.4, 0.46, 0.43]}
+HEIGHTS = {**VARIED, "com_height": [0.86, 0.8, 0.9, 0.84]}
+SETTINGS = [{"steps": 7}, {"steps": 3, **VARIED}, {"steps": 3, **HEIGHTS}]
 
 
-@pytest.mark.parametrize("settings", [{"steps": 7}, {"steps": 3, **VARIED}])
+@pytest.mark.parametrize("settings", SETTINGS)
 def test_follows_the_pendulum_equation(settings):
     plan = plan_walk(GroundProfile.paper(), **settings)
     for stance in plan.stances:
@@ -28,7 +30,7 @@ def test_follows_the_pendulum_equation(settings):
         )
 
 
-@pytest.mark.parametrize("settings", [{"steps": 7}, {"steps": 3, **VARIED}])
+@pytest.mark.parametrize("settings", SETTINGS)
 def test_switches_are_smooth_and_apexes_straight(settings):
     plan = plan_walk(GroundProfile.paper(), **settings)
     for before, after in zip(plan.stances[:-1], plan.stances[1:], strict=True):
@@ -55,6 +57,47 @@ def test_even_walk_keeps_its_width():
     plan = plan_walk(GroundProfile.flat(), steps=20)
     y = np.array([stance.foot[1] for stance in plan.stances])
     np.testing.assert_allclose(np.abs(np.diff(y)), 0.2, atol=1e-9)
+
+
+@pytest.mark.parametrize("steps", [2, 3])
+def test_feet_alternate_to_the_last_foothold(steps):
+    plan = plan_walk(GroundProfile.flat(), steps=steps)
+    feet = [plan.previous_foot, *(one.foot for one in plan.stances), plan.next_foot]
+    for stance, before, after in zip(plan.stances, feet[:-2], feet[2:], strict=True):
+        for other in (before, after):
+            assert np.sign(other[1] - stance.foot[1]) == stance.side.other.lateral
+
+
+def test_planes_of_the_com_rise_from_foothold_to_foothold():
+    """On uneven stairs with uneven steps; at the end the CoM still moves along its plane."""
+    ground = GroundProfile.stairs([0.1, 0.05, -0.08, 0.04], run=0.4)
+    plan = plan_walk(ground, steps=3, **VARIED)
+    feet = [plan.previous_foot, *(one.foot for one in plan.stances), plan.next_foot]
+    for stance, before, after in zip(plan.stances, feet[:-2], feet[2:], strict=True):
+        assert stance.slope == pytest.approx((after[2] - before[2]) / (after[0] - before[0]))
+        assert plan.com(stance.apex_time)[0][2] == pytest.approx(stance.foot[2] + stance.height)
+    last = plan.stances[-1]
+    assert abs(last.slope) > 0.01
+    assert plan.com(plan.duration)[1][2] == pytest.approx(last.slope * last.apex_speed)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.2])
+def test_the_swing_foot_passes_over_what_lies_between(height):
+    """A ridge in the middle of the first whole step, higher than the clearance."""
+    ground = GroundProfile(
+        x=np.array([0.0, 0.18, 0.2, 0.25, 0.27, 9.0]), z=np.array([0, 0, height, height, 0, 0])
+    )
+    plan = plan_walk(ground, steps=2)
+    step = plan.stances[1]
+    assert step.foot[0] == pytest.approx(0.45)
+    over = plan_walk(ground, steps=2, step_length=0.45).stances[1]
+    heights, clear = [], np.inf
+    for t in np.linspace(over.start, over.end, 200):
+        (x, y, z), _ = plan.swing(t, clearance=0.06)
+        heights.append(z)
+        clear = min(clear, z - ground.height(x, y))
+    assert clear > -1e-9
+    assert max(heights) == pytest.approx(0.06, abs=1e-3) if height == 0.0 else max(heights) > 0.2
 
 
 @pytest.fixture(scope="module")
