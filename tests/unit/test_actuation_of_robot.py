@@ -1,4 +1,4 @@
-"""Actuators of a robot: what the URDF states, what the user states instead, and what kernels get."""
+"""Actuators of a robot: what the URDF states, what the user states, and what kernels get."""
 
 import numpy as np
 import pytest

@@ -133,3 +133,11 @@ def test_embedded_part_is_checked() -> None:
         delay_margin([[0.0]], [[-1.0]], embedded_delay=0.1)
     with pytest.raises(InputError, match="embedded_delay is -0"):
         delay_margin([[0.0]], [[-1.0]], A_e=[[1.0]], embedded_delay=-0.1)
+
+
+def test_what_feeds_back_late_counts_without_delay_too():
+    """ẋ = −x − 0.1 x(t − d) + 2 x(t − e) grows for any e."""
+    loop = {"A_0": [[-1.0]], "A_1": [[-0.1]], "embedded_delay": 1e-3}
+    grows = delay_margin(**loop, A_e=[[2.0]])
+    assert (grows.delay, grows.unstable_roots) == (0.0, 1)
+    assert delay_margin(**loop, A_e=[[-2.0]]).unstable_roots == 0

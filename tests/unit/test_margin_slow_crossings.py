@@ -144,7 +144,7 @@ def test_roots_confirm_the_margin_beside_a_slow_crossing() -> None:
 
 
 def test_a_slow_crossing_ends_a_stable_range():
-    """ẋ = a x − x(t − d), a = 1 − 1e-8: after 1 s, at a turn of 1.4e-4 rad, which is no zero root."""
+    """ẋ = a x − x(t − d), a = 1 − 1e-8: after 1 s, at a turn of 1.4e-4 rad, no zero root."""
     a = 1.0 - 1e-8
     omega = math.sqrt((1.0 - a) * (1.0 + a))
     answer = delay_margin([[a]], [[-1.0]], horizon=3.0)
@@ -152,3 +152,10 @@ def test_a_slow_crossing_ends_a_stable_range():
     assert [one.unstable_roots for one in answer.intervals] == [0, 2]
     assert answer.intervals[0].upper == answer.delay
     assert answer.intervals[1].upper == 3.0
+
+
+def test_a_root_that_starts_on_the_axis_comes_back_after_a_period():
+    """ẍ = −0.7 x − 0.3 x(t − d): ±j without delay, right at once, from the left again at 2π."""
+    answer = delay_margin([[0.0, 1.0], [-0.7, 0.0]], [[0.0, 0.0], [-0.3, 0.0]])
+    assert (answer.delay, answer.unstable_roots) == (0.0, 2)
+    assert answer.first_crossing == pytest.approx(2.0 * math.pi)

@@ -201,3 +201,25 @@ def test_a_follower_with_multiplier_0_stands_still(tmp_path):
         free.frame_placement("c", np.array([0.1, 0.2, 0.4]))[0],
         atol=1e-15,
     )
+
+
+def test_continuous_joints_turn_without_end(tmp_path):
+    """As one number, not as cosine and sine; a revolute one keeps its limits."""
+    text = robot(link("base"), link("a"), joint("j", "base", "a", kind="continuous"))
+    arm = read(tmp_path, text)
+    assert (arm.nq, arm.nv) == (1, 1)
+    assert arm.position_upper[0] >= 1e6
+    assert arm.position_lower[0] <= -1e6
+    limited = read(tmp_path, text.replace('type="continuous"', 'type="revolute"'))
+    assert limited.position_upper[0] < 100.0
+
+
+@pytest.mark.parametrize("mass", [1.0, 1e-12])
+def test_links_that_weigh_nothing_are_named(mass, tmp_path):
+    size = 1e-12 if mass < 1.0 else 0.1
+    text = robot(link("base"), inertia("a", size, size, size, mass=mass), joint("j", "base", "a"))
+    if mass == 1.0:
+        read(tmp_path, text)
+        return
+    with pytest.raises(RobotError, match=r"almost no inertia to what moves at a \(joint j\)"):
+        read(tmp_path, text)
