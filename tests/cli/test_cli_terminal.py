@@ -1,5 +1,6 @@
 """Streams that are closed, names that are orders, failures of the tool itself."""
 
+import os
 import re
 import subprocess
 import sys
@@ -59,6 +60,18 @@ def test_names_reach_the_terminal_as_text(name, tmp_path, cli):
     code, text, _ = cli("certify", path, "--out", tmp_path / f"{name}.json")
     assert code == 0
     assert not orders.search(text)
+
+
+def test_letters_that_a_stream_lacks_are_written_out(tmp_path):
+    path = tmp_path / "g\u00e9nou.toml"
+    path.write_text(CASE.read_text().replace('urdf="one.urdf"', f'urdf="{CASE.parent}/one.urdf"'))
+    done = subprocess.run(
+        [sys.executable, "-m", "sealag", "certify", str(path)],
+        capture_output=True, cwd=tmp_path, timeout=120, check=False,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert b"g\\xe9nou.certificate.json" in done.stdout
 
 
 def test_names_that_look_alike_are_told_apart(tmp_path, cli):

@@ -41,7 +41,7 @@ def noticed(mutant: Mutant, tree: Path) -> tuple[str, str]:
         done = subprocess.run(
             [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider",
              *TESTS[mutant.room].split()],
-            cwd=tree, capture_output=True, text=True, timeout=1800, check=False,
+            cwd=tree, capture_output=True, text=True, timeout=600, check=False,
             env={"PATH": "/usr/bin:/bin", "HOME": str(tree), "OPENBLAS_NUM_THREADS": "1",
                  "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": f"{tree}/src:{tree}/studies:"
                  f"{tree}/tests:{tree}"},
