@@ -19,7 +19,7 @@ _ENDS = ("lower", "upper")
 _ENTRIES = ("ixx", "ixy", "ixz", "ixy", "iyy", "iyz", "ixz", "iyz", "izz")
 _INDEFINITE = 1e-6  # of a body's inertia: what rounding in a URDF does to a principal moment
 _PLACEHOLDER = 0.2  # of a body's inertia: sensors and covers fixed to public robots reach 0.15
-_MOST_MASS, _MOST_INERTIA, _MOST_LENGTH = 1e7, 1e9, 1e4  # kg, kg m², m: ships, in all three
+_MOST_MASS, _MOST_INERTIA, _MOST_LENGTH = 1e15, 1e15, 1e4  # kg, kg m², m: beyond, squares overflow
 _MOST_DAMPING = 1e6  # Nms/rad, Nm: as in a project file; more is a slip of the unit
 
 
