@@ -205,6 +205,27 @@ class TestPassivityObserver:
         assert not run.audit.delay_side.passive
         assert run.audit.joint_side.passive  # springs and motors are, whatever drives them
 
+    def test_the_work_of_a_push_is_nobody_s_activity(self, tmp_path):
+        """The joint side stores what a push gives; without that in its books it looks active."""
+        robot = planar_arm(tmp_path, count=2, mass=1.0, inertia=0.05, length=0.4)
+        springs = actuators(
+            robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=[10.0, 8.0]
+        )
+        push = Push(frame="link1", force=(0.0, 60.0, 60.0), start=0.1, duration=0.1)
+        run = closed_loop(
+            robot,
+            springs,
+            StoringPD(np.zeros(2), stiffness=20.0, motor=True),
+            q=np.zeros(2),
+            theta=np.zeros(2),
+            duration=0.5,
+            scene=Scene(pushes=[push]),
+        )
+        given = run.audit.scalar_flows["disturbance"]
+        assert given.max() > 0.1
+        assert run.audit.joint_side.passive
+        assert run.audit.joint_side.slack[-1] < given[-1], "its slack holds the push's work"
+
     @pytest.mark.parametrize("guilty", [0, 1])
     def test_the_joint_that_delivers_is_named(self, tmp_path, guilty):
         """Two joints that hardly feel each other, one of them ten times too stiff for its delay."""

@@ -163,6 +163,9 @@ def test_plain_errors_of_lower_tasks_run_another_stiffness_than_the_certified():
     expected = J[:first].T @ S[:first, :first] @ J[:first]
     expected += J[first:].T @ S[first:, first:] @ J_all[first:]
     np.testing.assert_allclose(F, expected, atol=AGREE * np.abs(F).max())
+    plain = certified(BAXTER, (), task_error=TaskError.PLAIN)
+    np.testing.assert_allclose(F, plain.F_theta[0], atol=AGREE * np.abs(F).max())
+    assert plain.asymmetry[0] == pytest.approx(float(relative_asymmetry(F)), rel=1e-3)
 
 
 @pytest.mark.parametrize("contacts", [1, 2])

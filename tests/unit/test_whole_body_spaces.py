@@ -123,6 +123,29 @@ def test_static_feedback_is_stiffer_by_the_springs():
     assert np.linalg.eigvalsh(static.F_theta[0] - F)[0] > -1e-9 * np.abs(F).max()
 
 
+def test_contraction_and_asymmetry_are_those_of_what_is_fed_back():
+    """Gravity's gradient is part of the contraction, the springs are part of the asymmetry."""
+    spaces = spaces_of(
+        BAXTER,
+        signal=StaticJoint(),
+        gravity=GravityCompensation.FEEDBACK,
+        stiffness_form=StiffnessForm.PUBLISHED,
+    )
+    root = np.sqrt(BAXTER.actuators.spring_stiffness)
+    factor = [
+        np.linalg.norm(F / np.outer(root, root), 2)
+        for F in (spaces.F_task[0] - spaces.F_gravity[0], spaces.F_task[0])
+    ]
+    assert spaces.contraction[0] == pytest.approx(factor[0], rel=1e-12)
+    assert factor[1] != pytest.approx(factor[0], rel=1e-3)
+    skew = [
+        np.linalg.norm(F - F.T) / np.linalg.norm(F + F.T)
+        for F in (spaces.F_theta[0], spaces.F_q[0])
+    ]
+    assert spaces.asymmetry[0] == pytest.approx(skew[0], rel=1e-12)
+    assert skew[1] != pytest.approx(skew[0], rel=1e-3)
+
+
 def test_static_feedback_without_contraction_has_no_bound():
     """And where the law is exactly as stiff as its springs, no stiffness either."""
     soft = actuators(
