@@ -62,13 +62,12 @@ def check_output(path: Path, *inputs: Path) -> None:
         FileError: it is one of the inputs, exists and is not a regular file, or cannot be a file.
     """
     try:
-        if not path.exists():
-            return
-        if not path.is_file():
+        if path.exists() and not path.is_file():
             raise FileError(
                 f"{path} is not a regular file and is not overwritten; choose another --out."
             )
-        taken = any(other.exists() and path.samefile(other) for other in inputs)
+        written = [one for one in (path, _draft_of(Path(os.path.realpath(path)))) if one.exists()]
+        taken = any(other.exists() and one.samefile(other) for one in written for other in inputs)
     except OSError as error:
         if isinstance(error, FileError):
             raise
@@ -133,7 +132,7 @@ class Draft:
         try:
             self.path = Path(os.path.realpath(path))
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._name = self.path.with_name(_hidden(self.path.name))
+            self._name = _draft_of(self.path)
             last = time.monotonic() + patience
             while True:
                 try:
@@ -216,11 +215,12 @@ class Draft:
             self.file.close()
 
 
-def _hidden(name: str) -> str:
-    """The draft's name; a short one where the file system would refuse it."""
+def _draft_of(path: Path) -> Path:
+    """Where a file's draft lies; under a short name where the file system would refuse its own."""
+    name = path.name
     if len(os.fsencode(name)) > _LONGEST_NAME:
         name = hashlib.sha256(os.fsencode(name)).hexdigest()[:32]
-    return f".{name}.sealag-draft"
+    return path.with_name(f".{name}.sealag-draft")
 
 
 def _claimed(name: str, _flags: int) -> int:

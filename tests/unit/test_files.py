@@ -39,6 +39,10 @@ def test_outputs_do_not_replace_inputs_folders_or_devices(tmp_path):
     for wrong in (path, link):
         with pytest.raises(FileError, match=r"\.txt"):
             check_output(wrong, path)
+    other = tmp_path / ".c.txt.sealag-draft"
+    write_text(other, "an input with a draft's name")
+    with pytest.raises(FileError, match=r"c\.txt is an input"):
+        check_output(tmp_path / "c.txt", other)
     for wrong in (tmp_path, Path(os.devnull)):
         with pytest.raises(FileError, match="regular"):
             check_output(wrong)
