@@ -22,7 +22,8 @@ TESTS = {
                  "tests/unit/test_certificate_local.py tests/unit/test_certificate_edges.py "
                  "tests/unit/test_certificate_drives.py tests/oracle/test_passivity_multitask.py "
                  "tests/oracle/test_passivity_against_sdp.py",
-    "design": "tests/unit/test_design_local.py tests/unit/test_design_cases.py "
+    "design": "tests/unit/test_design_local.py tests/unit/test_design_motors.py "
+              "tests/unit/test_design_cases.py "
               "tests/unit/test_design_questions.py tests/unit/test_design_system.py "
               "tests/unit/test_design_starter.py tests/unit/test_design_drift.py "
               "tests/meta/test_no_silent_key.py tests/cli/test_cli_certify.py "
@@ -199,8 +200,8 @@ MUTANTS = [
         ("out -= self._at.frame_jacobian(contact.frame)[: last - first].T @ force[first:last]",
          "first = last; continue", "contact forces in the links' stiffness"),
         ("H = others @ ((H + H.T) / 2.0) @ others", "H = (H + H.T) / 2.0", "rigid motions"),
-        ("G[:3, 3] = R.T @ np.cross([0.0, 0.0, 1.0], q[:3])", "pass",
-         "turn about the vertical away from the origin"),
+        ("G[3:6, 3] = R.T[:, 2]", "G[3:6, 3] = R[:, 2]",
+         "turn about the vertical of a base that leans"),
         ("left[self._robot.nv_base :] -= springs\n        return np.linalg.lstsq",
          "pass\n        return np.linalg.lstsq", "what springs carry"),
         ("Z.T @ self._robot.mass_matrix(q) @ Z", "np.eye(Z.shape[1])", "inertia of free motions"),

@@ -197,6 +197,21 @@ def test_symmetries_are_what_contacts_leave_and_no_task_feels(contacts, count, f
         assert np.abs(moved).max(initial=0.0) < 1e-9 * np.abs(loop.A_0).max()
 
 
+def test_the_turn_about_the_vertical_passes_through_the_foot_wherever_it_stands():
+    """Away from the origin the base moves sideways as the robot turns about its foot."""
+    law = replace(HUME.law, signal=MotorAngles(), gravity="none")
+    law = replace(law, tasks=(joint_task(HUME.robot, 100.0),))
+    away = HUME.posture.copy()
+    away[:2] += [3.0, -2.0]
+    loops = [replace(HUME, contacts=BOTH[:1], law=law, posture=q) for q in (HUME.posture, away)]
+    here, there = (one.frozen(rest=one.in_posture()) for one in loops)
+    assert here.symmetries.shape[1] == there.symmetries.shape[1] == 1
+    moved = (there.A_0 + there.A_1) @ there.symmetries
+    assert np.abs(moved).max() < 1e-9 * np.abs(there.A_0).max()
+    roots = [np.sort(np.linalg.eigvals(one.A_0 + one.A_1).real) for one in (here, there)]
+    np.testing.assert_allclose(roots[0], roots[1], atol=1e-4)
+
+
 def test_contact_forces_are_part_of_the_links():
     """The sideways sway of ANYmal by the forces in its feet: 87.4415 ms; 87.313 without those that
     joints see, 90.5 without any."""

@@ -124,14 +124,17 @@ def test_static_feedback_is_stiffer_by_the_springs():
 
 
 def test_contraction_and_asymmetry_are_those_of_what_is_fed_back():
-    """Gravity's gradient is part of the contraction, the springs are part of the asymmetry."""
+    """Gravity's gradient is part of the contraction, the springs are part of the asymmetry; no two
+    springs are alike."""
+    K = BAXTER.actuators.spring_stiffness * np.linspace(1.0, 3.0, BAXTER.robot.n)
+    system = replace(BAXTER, actuators=replace(BAXTER.actuators, spring_stiffness=K))
     spaces = spaces_of(
-        BAXTER,
+        system,
         signal=StaticJoint(),
         gravity=GravityCompensation.FEEDBACK,
         stiffness_form=StiffnessForm.PUBLISHED,
     )
-    root = np.sqrt(BAXTER.actuators.spring_stiffness)
+    root = np.sqrt(K)
     factor = [
         np.linalg.norm(F / np.outer(root, root), 2)
         for F in (spaces.F_task[0] - spaces.F_gravity[0], spaces.F_task[0])

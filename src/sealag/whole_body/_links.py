@@ -154,8 +154,7 @@ class LinkPlant:
         )
         G = np.zeros((self._robot.nv, 4))
         G[:3, :3] = R.T
-        G[3:6, 3] = R.T[:, 2]
-        G[:3, 3] = R.T @ np.cross([0.0, 0.0, 1.0], q[:3])
+        G[3:6, 3] = R.T[:, 2]  # about the base's own vertical: translations move it elsewhere
         if len(J_s):
             _, values, rows = np.linalg.svd(J_s @ G, full_matrices=True)
             rank = int((values > _RIGID * max(values[0], 1e-300)).sum())
