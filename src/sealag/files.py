@@ -17,6 +17,7 @@ from sealag.errors import FileError
 
 _PATIENCE = 10.0  # s that a file that is written at once waits for another writer of it
 _POLL = 0.05  # s
+_DRAFT = ".sealag-draft"
 _LONGEST_NAME = 200  # bytes; file systems allow 255
 _NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 """How file systems without hard links answer."""
@@ -62,11 +63,14 @@ def check_output(path: Path, *inputs: Path) -> None:
         FileError: it is one of the inputs, exists and is not a regular file, or cannot be a file.
     """
     try:
-        if path.exists() and not path.is_file():
+        target = Path(os.path.realpath(path))  # where a draft goes, `..` and links followed
+        if target.exists() and not target.is_file():
             raise FileError(
                 f"{path} is not a regular file and is not overwritten; choose another --out."
             )
-        written = [one for one in (path, _draft_of(Path(os.path.realpath(path)))) if one.exists()]
+        if target.name.endswith(_DRAFT):
+            raise FileError(f"{path} is a name of unfinished files; choose another --out.")
+        written = [one for one in (target, _draft_of(target)) if one.exists()]
         taken = any(other.exists() and one.samefile(other) for one in written for other in inputs)
     except OSError as error:
         if isinstance(error, FileError):
@@ -220,7 +224,7 @@ def _draft_of(path: Path) -> Path:
     name = path.name
     if len(os.fsencode(name)) > _LONGEST_NAME:
         name = hashlib.sha256(os.fsencode(name)).hexdigest()[:32]
-    return path.with_name(f".{name}.sealag-draft")
+    return path.with_name(f".{name}{_DRAFT}")
 
 
 def _claimed(name: str, _flags: int) -> int:

@@ -39,6 +39,12 @@ def test_outputs_do_not_replace_inputs_folders_or_devices(tmp_path):
     for wrong in (path, link):
         with pytest.raises(FileError, match=r"\.txt"):
             check_output(wrong, path)
+    (tmp_path / "d.txt").symlink_to("none/../a.txt")
+    for wrong in (tmp_path / "none" / ".." / "a.txt", path / ".." / "a.txt", tmp_path / "d.txt"):
+        with pytest.raises(FileError, match="is an input"):
+            check_output(wrong, path)
+    with pytest.raises(FileError, match="unfinished"):
+        check_output(tmp_path / ".e.txt.sealag-draft")
     other = tmp_path / ".c.txt.sealag-draft"
     write_text(other, "an input with a draft's name")
     with pytest.raises(FileError, match=r"c\.txt is an input"):
