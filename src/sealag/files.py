@@ -10,10 +10,11 @@ import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib import resources
 from pathlib import Path
 from typing import BinaryIO, Self
 
-from sealag.errors import FileError
+from sealag.errors import FileError, UnknownNameError, either
 
 _PATIENCE = 10.0  # s that a file that is written at once waits for another writer of it
 _POLL = 0.05  # s
@@ -62,7 +63,7 @@ def check_output(path: Path, *inputs: Path) -> None:
     Raises:
         FileError: it is one of the inputs, exists and is not a regular file, or cannot be a file.
     """
-    try:
+    with _told(path):
         target = Path(os.path.realpath(path))  # where a draft goes, `..` and links followed
         if target.exists() and not target.is_file():
             raise FileError(
@@ -72,12 +73,26 @@ def check_output(path: Path, *inputs: Path) -> None:
             raise FileError(f"{path} is a name of unfinished files; choose another --out.")
         written = [one for one in (target, _draft_of(target)) if one.exists()]
         taken = any(other.exists() and one.samefile(other) for one in written for other in inputs)
-    except OSError as error:
-        if isinstance(error, FileError):
-            raise
-        raise _unwritable(path, error) from error
     if taken:
         raise FileError(f"{path} is an input and is not overwritten; choose another --out.")
+
+
+def bundled(name: str, *, ending: str, what: str) -> Path:
+    """Return the path of a file that ships with sealag.
+
+    Args:
+        name: with or without its ending.
+        ending: such as ".urdf".
+        what: what messages call it.
+
+    Raises:
+        UnknownNameError: there is none of this name.
+    """
+    folder, stem = Path(str(resources.files("sealag.data"))), name.removesuffix(ending)
+    known = sorted(found.stem for found in folder.glob(f"*{ending}"))
+    if stem not in known:
+        raise UnknownNameError(f"No bundled {what} is called {name!r}; there is {either(known)}.")
+    return folder / f"{stem}{ending}"
 
 
 def is_inside(path: Path, folder: Path) -> bool:
@@ -105,8 +120,15 @@ def make_folder(path: Path) -> None:
         raise FileError(f"The folder {path} cannot be made: {error.strerror or error}.") from error
 
 
-def _unwritable(path: Path, error: OSError) -> FileError:
-    return FileError(f"{path} cannot be written: {error.strerror or error}.")
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Let what goes wrong say which file cannot be written; a FileError says so itself."""
+    try:
+        yield
+    except FileError:
+        raise
+    except OSError as error:
+        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 class Draft:
@@ -133,7 +155,7 @@ class Draft:
 
     def __init__(self, path: Path, *, patience: float = 0.0) -> None:
         self.asked = path
-        try:
+        with _told(path):
             self.path = Path(os.path.realpath(path))
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._name = _draft_of(self.path)
@@ -149,10 +171,19 @@ class Draft:
                             "another --out."
                         ) from None
                     time.sleep(_POLL)
-        except OSError as error:
-            if isinstance(error, FileError):
-                raise
-            raise _unwritable(path, error) from error
+
+    @classmethod
+    def of(cls, path: "Path | Draft", *, patience: float = 0.0) -> "Draft":
+        """Return a draft of a file; one that is a draft already is itself.
+
+        Args:
+            path: where the file goes, or a draft of it.
+            patience: how long to wait for another writer, s.
+
+        Raises:
+            FileError: it cannot be written, or somebody else is writing it.
+        """
+        return path if isinstance(path, Draft) else cls(path, patience=patience)
 
     def __enter__(self) -> Self:
         return self
@@ -169,20 +200,14 @@ class Draft:
         Raises:
             FileError: it cannot be renamed, or the name is taken.
         """
-        try:
+        with _told(self.asked):
             os.fsync(self.file.fileno())
             if replace:
                 if self.path.is_file():
                     os.fchmod(self.file.fileno(), stat.S_IMODE(self.path.stat().st_mode))
                 os.replace(self._name, self.path)
-            else:
-                _name_new(self._name, self.path)
-        except FileExistsError as error:
-            raise FileError(
-                f"{self.asked} exists already; choose another name with --out."
-            ) from error
-        except OSError as error:
-            raise _unwritable(self.asked, error) from error
+            elif not _named_new(self._name, self.path):
+                raise FileError(f"{self.asked} exists already; choose another name with --out.")
         self.drop()
 
     def keep_beside(self, word: str) -> Path:
@@ -197,16 +222,14 @@ class Draft:
         Raises:
             FileError: it cannot be named.
         """
+        end = self.asked.suffix
+        others = (f".{word}{f'-{k}' if k > 1 else ''}{end}" for k in itertools.count(1))
         target = self.asked
-        for number in itertools.count(1):
-            try:
-                _name_new(self._name, Path(os.path.realpath(target)))
-                break
-            except FileExistsError:
-                suffix = f".{word}{f'-{number}' if number > 1 else ''}{self.asked.suffix}"
-                target = self.asked.with_suffix(suffix)
-            except OSError as error:
-                raise _unwritable(target, error) from error
+        while True:
+            with _told(target):
+                if _named_new(self._name, Path(os.path.realpath(target))):
+                    break
+            target = self.asked.with_suffix(next(others))
         self.drop()
         return target
 
@@ -248,16 +271,19 @@ def _claimed(name: str, _flags: int) -> int:
         os.close(handle)
 
 
-def _name_new(draft: Path, target: Path) -> None:
-    """Give a draft a name that nothing has; FileExistsError if something has."""
+def _named_new(draft: Path, target: Path) -> bool:
+    """Give a draft a name, unless something has it; whether it has it now."""
     try:
         os.link(draft, target)
+    except FileExistsError:
+        return False
     except OSError as error:
         if error.errno not in _NO_LINKS:
             raise
         if os.path.lexists(target):
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from error
+            return False
         os.rename(draft, target)
+    return True
 
 
 @contextmanager
@@ -275,15 +301,11 @@ def written_whole(path: Path | Draft, *, replace: bool = True) -> Iterator[Binar
     Raises:
         FileError: it cannot be written, or somebody else is writing it.
     """
-    with path if isinstance(path, Draft) else Draft(path, patience=_PATIENCE) as draft:
-        try:
+    with Draft.of(path, patience=_PATIENCE) as draft:
+        with _told(draft.asked):
             file = io.BufferedWriter(draft.file)
             yield file
             file.flush()
-        except OSError as error:
-            if isinstance(error, FileError):
-                raise
-            raise _unwritable(draft.asked, error) from error
         draft.keep(replace=replace)
 
 
@@ -304,6 +326,7 @@ def write_text(path: Path | Draft, text: str, *, replace: bool = True) -> None:
 
 __all__ = [
     "Draft",
+    "bundled",
     "check_output",
     "is_inside",
     "make_folder",

@@ -12,6 +12,8 @@ from helpers.designs import EXAMPLES
 from sealag.cli import main
 
 CASE = EXAMPLES.parent / "tests" / "data" / "cases" / "s7_static_joint_gravity.toml"
+ANYWHERE = CASE.read_text().replace('urdf="one.urdf"', f'urdf="{CASE.parent}/one.urdf"')
+"""The case with its robot's whole path, for a project file in any folder."""
 
 
 def closed(streams, *words, folder):
@@ -50,13 +52,12 @@ def test_names_reach_the_terminal_as_text(name, tmp_path, cli):
     assert err.count("\n") == 1
     assert not orders.search(err)
     spelled = "".join(f"\\u{ord(c):04x}" if not c.isprintable() else c for c in name)
-    text = CASE.read_text().replace('name="t"', f'name="t"\nframe="{spelled}"')
-    path.write_text(text.replace('urdf="one.urdf"', f'urdf="{CASE.parent}/one.urdf"'))
+    path.write_text(ANYWHERE.replace('name="t"', f'name="t"\nframe="{spelled}"'))
     code, _, err = cli("certify", path)
     assert code == 2
     assert err.count("\n") == 1
     assert not orders.search(err)
-    path.write_text(CASE.read_text().replace('urdf="one.urdf"', f'urdf="{CASE.parent}/one.urdf"'))
+    path.write_text(ANYWHERE)
     code, text, _ = cli("certify", path, "--out", tmp_path / f"{name}.json")
     assert code == 0
     assert not orders.search(text)
@@ -64,7 +65,7 @@ def test_names_reach_the_terminal_as_text(name, tmp_path, cli):
 
 def test_letters_that_a_stream_lacks_are_written_out(tmp_path):
     path = tmp_path / "g\u00e9nou.toml"
-    path.write_text(CASE.read_text().replace('urdf="one.urdf"', f'urdf="{CASE.parent}/one.urdf"'))
+    path.write_text(ANYWHERE)
     done = subprocess.run(
         [sys.executable, "-m", "sealag", "certify", str(path)],
         capture_output=True, cwd=tmp_path, timeout=120, check=False,

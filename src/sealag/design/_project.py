@@ -24,8 +24,8 @@ from sealag.design._plain_words import first_problem
 from sealag.design._schema import AXES, Project, SamplesDelay
 from sealag.design._system import Source, System
 from sealag.design._walking import walking_of
-from sealag.errors import FileError, ProjectError, SealagError, UnknownNameError, either
-from sealag.files import read_whole
+from sealag.errors import FileError, ProjectError, SealagError
+from sealag.files import bundled, read_whole
 from sealag.passivity import Criterion
 from sealag.robot import (
     UNIT_TOLERANCE,
@@ -56,14 +56,8 @@ def resolve_project(text: str | Path) -> Path:
     """
     if not str(text).startswith("bundled:"):
         return Path(text)
-    from importlib import resources
-
-    folder = Path(str(resources.files("sealag.data")))
     name = str(text).removeprefix("bundled:").removesuffix(".toml")
-    known = sorted(found.stem for found in folder.glob("*.toml"))
-    if name not in known:
-        raise UnknownNameError(f"No bundled project is called {name!r}; there is {either(known)}.")
-    return folder / f"{name}.toml"
+    return bundled(name, ending=".toml", what="project")
 
 
 def load(path: str | Path) -> System:

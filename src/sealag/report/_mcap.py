@@ -106,7 +106,7 @@ class McapRecorder:
     def __enter__(self) -> Self:
         from mcap.writer import CompressionType, Writer
 
-        self._draft = self.path if isinstance(self.path, Draft) else Draft(self.path)
+        self._draft = Draft.of(self.path)
         try:
             self._file = ReservedFile(self._draft.file, self._draft.path.parent)
             self._writer = Writer(

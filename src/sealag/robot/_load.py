@@ -7,7 +7,6 @@ import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -15,8 +14,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from sealag.errors import FileError, RobotError, UnknownNameError, either, near
-from sealag.files import is_inside, read_whole
+from sealag.errors import FileError, RobotError, near
+from sealag.files import bundled, is_inside, read_whole
 from sealag.robot._mimic import Coupling, Follower, read_followers
 from sealag.robot._urdf import LEAST_INERTIA, ROOT_JOINT, check_urdf, joint_dynamics
 from sealag.typing import Array
@@ -27,23 +26,6 @@ _SET_LOG_LEVEL = "_ZN14console_bridge11setLogLevelENS_8LogLevelE"  # setLogLevel
 _LOG_NOTHING = 4  # CONSOLE_BRIDGE_LOG_NONE
 _ROUNDED = 0.05  # of the largest moment: what two significant digits do to a plate's
 _SINGULAR = 1e-9  # least eigenvalue of the mass matrix scaled to a unit diagonal
-
-
-def bundled_robot_path(name: str) -> Path:
-    """Return the path of a robot that ships with sealag.
-
-    Args:
-        name: such as `hume` or `hume.urdf`.
-
-    Raises:
-        UnknownNameError: there is no such robot.
-    """
-    folder = Path(str(resources.files("sealag.data")))
-    known = [found.stem for found in folder.glob("*.urdf")]
-    path = folder / f"{name.removesuffix('.urdf')}.urdf"
-    if path.stem not in known or path.parent != folder:
-        raise UnknownNameError(f"No bundled robot is called {name!r}; there is {either(known)}.")
-    return path
 
 
 def example_robot_path(relative: str) -> Path:
@@ -84,7 +66,7 @@ def resolve_urdf(text: str, *, relative_to: Path = Path()) -> Path:
         FileError: an example robot is not installed, or a home folder does not exist.
     """
     if text.startswith("bundled:"):
-        return bundled_robot_path(text.removeprefix("bundled:"))
+        return bundled(text.removeprefix("bundled:"), ending=".urdf", what="robot")
     if text.startswith("example-robot-data:"):
         return example_robot_path(text.removeprefix("example-robot-data:"))
     try:
