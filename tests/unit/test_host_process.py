@@ -45,8 +45,8 @@ def test_threads_and_processes_answer_alike():
         )
         for name in DESIGNS
     ]
-    told = [pickle.loads(other.communicate(timeout=120)[0]) for other in others]
-    assert told == [alone[name] for name in DESIGNS]
+    answered = [pickle.loads(other.communicate(timeout=120)[0]) for other in others]
+    assert answered == [alone[name] for name in DESIGNS]
 
 
 def test_threads_may_share_a_design():
@@ -116,3 +116,32 @@ def test_no_file_stays_open():
     for _ in range(3):
         told(load(EXAMPLES / "baxter.toml"))
     assert len(os.listdir("/proc/self/fd")) == before
+
+
+def test_ctrl_c_at_any_instant_ends_a_run_and_nothing_else():
+    """Raised inside a compiled call, KeyboardInterrupt crashes: one in three did."""
+    program = """
+import signal, sys
+from sealag.design import load
+import sealag
+system = load(sys.argv[1])
+sealag.simulate(system, duration=0.01)
+signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+for k in range(40):
+    def begun(t):
+        if not signal.getitimer(signal.ITIMER_REAL)[0]:
+            signal.setitimer(signal.ITIMER_REAL, 0.01 + 0.00137 * k)
+    print(sealag.simulate(system, duration=60.0, progress=begun).outcome.value)
+assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+mine = lambda *_: print("mine")
+signal.signal(signal.SIGINT, mine)
+signal.setitimer(signal.ITIMER_REAL, 0.1)
+print(sealag.simulate(system, duration=2.0).outcome.value)
+assert signal.getsignal(signal.SIGINT) is mine
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(EXAMPLES / "baxter.toml")],
+        capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["interrupted"] * 40 + ["mine", "completed"]

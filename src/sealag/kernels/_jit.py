@@ -118,6 +118,9 @@ class Kept(structref.StructRefProxy):
 
 structref.define_proxy(Kept, _KeptType, ["parts"])
 
+# Numba's own is a Python property, which a signal's handler may interrupt inside a compiled call.
+Kept._numba_type_ = vars(structref.StructRefProxy)["_type"]
+
 
 @entry
 def keep(parts):

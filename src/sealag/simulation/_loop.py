@@ -12,6 +12,7 @@ from sealag.kernels import keep
 from sealag.robot import Robot
 from sealag.simulation._audit import Stated, UndelayedWork, audit
 from sealag.simulation._exchange import Exchanges
+from sealag.simulation._interrupt import Interrupt
 from sealag.simulation._memory import empty_log, events_of, open_channels
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
@@ -236,7 +237,8 @@ class _Loop:
         self._plan(steps, self.clock.steps_of("log", log_period))
         outcome, message = Outcome.COMPLETED, ""
         try:
-            self._glide(progress)
+            with Interrupt() as interrupt:
+                self._glide(progress, interrupt)
         except PlantStop as stop:
             outcome, message = stop.outcome, stop.message
             if outcome in _MAY_BE_NUMERICAL:
@@ -259,12 +261,13 @@ class _Loop:
         """How many instants are logged."""
         return int(np.isfinite(self._log.time).sum())
 
-    def _glide(self, progress: Callable[[float], None] | None) -> None:
+    def _glide(self, progress: Callable[[float], None] | None, interrupt: Interrupt) -> None:
         """Go on from one thing that needs Python to the next, until the end."""
         kernel, plant, channels = self._kernel, self.plant, self._channels
         cursor, course = kernel.Cursor(0.0, 0, 0, kernel.WATCH), self._course
         shown, every = 0, max(1, round(0.1 / self.clock.physics))
         while True:
+            interrupt.check()
             why, plant.time, cursor = plant.glide(course, cursor, self._said)
             time, step, event, part = cursor
             if progress is not None and step > shown:  # what was there then is logged
