@@ -4,9 +4,11 @@
 needs Python: a tick, another load, a change of contact.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sealag.kernels import spatial
 from sealag.kernels._jit import entry, inner
@@ -34,8 +36,8 @@ class Channels(NamedTuple):
     """What happens when in a run, and what is on its way."""
 
     due: Array  # (E,) instants of events, s, increasing
-    kind: IntArray  # (E,) LOAD, SAMPLE, TICK or TAKE
-    tick: IntArray  # (E,) whose sample, or whose command
+    kind: NDArray[np.int8]  # (E,) LOAD, SAMPLE, TICK or TAKE
+    tick: NDArray[np.int32]  # (E,) whose sample, or whose command
     samples: Array  # (R, row) measurements that are on their way, at their tick modulo R
     commands: Array  # (R, n) commands that are on their way, likewise
     sent: Array  # (n,) the last command, Nm
@@ -198,11 +200,13 @@ def log_shapes(nq: int, nv: int, n: int, *, points: int) -> dict[str, tuple[int,
     return {name: shapes.get(name, (n,)) for name in Log._fields}
 
 
-def allocate_log(rows: int, shapes: dict[str, tuple[int, ...]]) -> Log:
-    """Return an empty log of rows of given shapes."""
+def allocate_log(
+    rows: int, shapes: dict[str, tuple[int, ...]], zeros: Callable[..., Any] = np.zeros
+) -> Log:
+    """Return an empty log of rows of given shapes, its arrays made by `zeros`."""
     return Log(
         **{
-            name: np.zeros((rows, *shape), np.int64 if name in _WHOLE else float)
+            name: zeros((rows, *shape), np.int64 if name in _WHOLE else float)
             for name, shape in shapes.items()
         }
     )
@@ -211,11 +215,12 @@ def allocate_log(rows: int, shapes: dict[str, tuple[int, ...]]) -> Log:
 def idle(n: int) -> Course:
     """Return the course of a plant of n joints that is in no run."""
     log, empty = allocate_log(0, log_shapes(0, 0, n, points=0)), np.zeros(0)
-    none, one = np.zeros(0, np.int64), np.zeros(1)
+    one = np.zeros(1)
     channels = Channels(
-        due=empty, kind=none, tick=none, samples=np.zeros((1, 1)), commands=np.zeros((1, n)),
-        sent=np.zeros(n), acting_tick=np.zeros(1, np.int64), torque_known=empty,
-        torque_history=np.zeros((1, n)), storage=one, tank=one.copy(), undelayed_work=np.zeros(n),
+        due=empty, kind=np.zeros(0, np.int8), tick=np.zeros(0, np.int32),
+        samples=np.zeros((1, 1)), commands=np.zeros((1, n)), sent=np.zeros(n),
+        acting_tick=np.zeros(1, np.int64), torque_known=empty, torque_history=np.zeros((1, n)),
+        storage=one, tank=one.copy(), undelayed_work=np.zeros(n),
     )  # fmt: skip
     periods = Periods(step=1.0, steps=0, log=1, watch=1, torque=1, torque_period=1.0)
     limits = Limits(deflection=1.0, speed=1.0, height=-1.0, tilt=-1.0, up=np.zeros((1, 3)))

@@ -52,19 +52,11 @@ def write_run(
         "project.toml": project.encode(),
         robot.urdf_path.name: robot.urdf_path.read_bytes(),
     }
-    tables = {"/delay": _ages(run), "/energy": _energies(run), "/work": _works(run)}
-    tables["/power/port"] = {
-        f"{joint}_w": run.tau_sea[:, k] * run.v[:, robot.nv_base + k]
-        for k, joint in enumerate(run.joints)
-    }
-    if run.feet:
-        tables["/contact"] = _contacts(run)
     with McapRecorder(
         path=path, joints=run.joints, metadata=metadata, attachments=attachments,
         whole=run.outcome is not Outcome.INTERRUPTED,
     ) as recorder:  # fmt: skip
-        for first in range(0, len(run.time), _BLOCK):
-            rows = slice(first, first + _BLOCK)
+        for rows in run.blocks(_BLOCK):
             time = run.time[rows]
             q_joint = robot.joint_positions(run.q[rows])
             rates = run.v[rows, robot.nv_base :]
@@ -79,9 +71,16 @@ def write_run(
             ):
                 names = [f"{joint}_{unit}" for joint in run.joints]
                 recorder.write_signal(topic, names, time, values=values[rows])
-            for topic, table in tables.items():
-                values = np.column_stack([column[rows] for column in table.values()])
-                recorder.write_signal(topic, list(table), time, values=values)
+            for topic, columns in (
+                ("/delay", _ages(run, rows)),
+                ("/energy", _energies(run, rows)),
+                ("/work", _works(run, rows)),
+                ("/power/port", _port_powers(run, rows, rates)),
+                ("/contact", _contacts(run, rows)),
+            ):
+                if columns:
+                    values = np.column_stack(list(columns.values()))
+                    recorder.write_signal(topic, list(columns), time, values=values)
             recorder.write_transforms(frames, time, _poses(robot, frames, run.q[rows]))
             if progress is not None:
                 progress(float(time[-1]))
@@ -90,11 +89,11 @@ def write_run(
     return recorder.saved
 
 
-def _ages(run: Run) -> dict[str, Array]:
-    return {"measurement_s": run.measurement_age, "command_s": run.command_age}
+def _ages(run: Run, rows: slice) -> dict[str, Array]:
+    return {"measurement_s": run.measurement_age[rows], "command_s": run.command_age[rows]}
 
 
-def _energies(run: Run) -> dict[str, Array]:
+def _energies(run: Run, rows: slice) -> dict[str, Array]:
     """What is stored, and what the books of the first law leave open."""
     books = run.audit
     named = {
@@ -104,39 +103,44 @@ def _energies(run: Run) -> dict[str, Array]:
         "delay_line": books.delay_storage,
         "residual": books.residual,
     }
-    return {f"{name}_j": values for name, values in named.items() if values is not None}
+    return {f"{name}_j": values[rows] for name, values in named.items() if values is not None}
 
 
-def _works(run: Run) -> dict[str, Array]:
+def _works(run: Run, rows: slice) -> dict[str, Array]:
     """Works since the start by mechanism, and the slack of each passivity observer."""
     books = run.audit
-    named = {name: works.sum(axis=1) for name, works in books.joint_flows.items()}
-    named |= books.scalar_flows | {"inertia_shaping": books.inertia_shaping}
-    for name, works in (
-        ("delay_injection", books.delay_injection),
-        ("law_injection", books.law_injection),
-    ):
-        if works is not None:
-            named[name] = works
-    for name, side in (
-        ("joint_side_slack", books.joint_side),
-        ("controller_side_slack", books.controller_side),
-        ("delay_side_slack", books.delay_side),
-    ):
-        if side is not None:
-            named[name] = side.slack
-    return {f"{name}_j": works for name, works in named.items()}
+    sides = {
+        "joint_side_slack": books.joint_side,
+        "controller_side_slack": books.controller_side,
+        "delay_side_slack": books.delay_side,
+    }
+    named = {
+        **books.scalar_flows,
+        "inertia_shaping": books.inertia_shaping,
+        "delay_injection": books.delay_injection,
+        "law_injection": books.law_injection,
+        **{name: None if side is None else side.slack for name, side in sides.items()},
+    }
+    works = {name: works[rows].sum(axis=1) for name, works in books.joint_flows.items()}
+    works |= {name: values[rows] for name, values in named.items() if values is not None}
+    return {f"{name}_j": values for name, values in works.items()}
 
 
-def _contacts(run: Run) -> dict[str, Array]:
+def _port_powers(run: Run, rows: slice, rates: Array) -> dict[str, Array]:
+    """What the springs give the links."""
+    powers = (run.tau_sea[rows] * rates).T
+    return {f"{joint}_w": power for joint, power in zip(run.joints, powers, strict=True)}
+
+
+def _contacts(run: Run, rows: slice) -> dict[str, Array]:
     """Mode (0 open, 1 sticking, 2 slipping) and force of each contact point."""
     columns: dict[str, Array] = {}
     for point, foot in enumerate(run.feet):
         number = run.feet[:point].count(foot)
         name = f"{foot}_{number}" if run.feet.count(foot) > 1 else foot
-        columns[f"{name}_mode"] = run.contact_mode[:, point].astype(float)
+        columns[f"{name}_mode"] = run.contact_mode[rows, point].astype(float)
         for axis, way in enumerate(("tangent_1", "tangent_2", "normal")):
-            columns[f"{name}_{way}_n"] = run.contact_force[:, point, axis]
+            columns[f"{name}_{way}_n"] = run.contact_force[rows, point, axis]
     return columns
 
 

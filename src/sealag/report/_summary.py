@@ -24,12 +24,12 @@ def run_summary(run: Run, *, recording: Path) -> dict[str, Any]:
         "duration_s": float(run.time[-1]),
         "seed": run.seed,
         "recording": str(recording),
-        "largest_joint_speed_rad_s": float(np.abs(run.theta_dot).max()),
-        "largest_spring_torque_nm": float(np.abs(run.tau_sea).max()),
+        "largest_joint_speed_rad_s": _largest_size(run.theta_dot),
+        "largest_spring_torque_nm": _largest_size(run.tau_sea),
         "measurement_age_s": run.ages.measurement,
         "command_age_s": run.ages.command,
         "total_age_s": run.ages.total,
-        "energy_residual_j": float(np.abs(books.residual).max()),
+        "energy_residual_j": _largest_size(books.residual),
         "energy_throughput_j": float(books.throughput[-1]),
         "joint_side_passive": joint.passive,
         "controller_side_passive": central.passive if central else None,
@@ -50,6 +50,10 @@ def run_summary(run: Run, *, recording: Path) -> dict[str, Any]:
 
 def _largest(values: Array | None) -> float | None:
     return None if values is None else float(values.max())
+
+
+def _largest_size(values: Array) -> float:
+    return max(float(values.max()), -float(values.min()))
 
 
 def _largest_magnitude(values: Array | None) -> float | None:

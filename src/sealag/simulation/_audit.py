@@ -19,12 +19,14 @@ takings, so that its work is exact; that of τ_now is the trapezoid in θ over t
 potential that is quadratic in θ, and otherwise known to the bound that is stated beside it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from sealag.kernels.ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
+from sealag.kernels.ledger import DISTURBANCE, JOINT_FLOWS, MOTOR_STORE, SCALAR_FLOWS, STORES
 from sealag.simulation._ledger import residual
+from sealag.simulation._store import Store, blocks, release
 from sealag.typing import Array
 
 _STILL = 1e-6
@@ -121,7 +123,7 @@ class Audit:
         """
         largest = float(np.abs(self.residual).max(initial=0.0))
         moved = float(self.throughput[-1]) if self.throughput.size else 0.0
-        stored = float(np.sum(np.abs(list(self.stores.values())), axis=0).max(initial=0.0))
+        stored = float(sum(map(np.abs, self.stores.values()), np.zeros(1)).max(initial=0.0))
         scale = max(moved, _STILL * stored)
         return largest / scale if scale > 0.0 else largest
 
@@ -185,6 +187,7 @@ def _trapezoid(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
 
 def audit(
     *,
+    store: Store,
     time: Array,
     joints: tuple[str, ...],
     stores: Array,
@@ -199,6 +202,7 @@ def audit(
     """Assemble the audit of a run from its logged books.
 
     Args:
+        store: Where its arrays lie.
         time: Instants (N,), s.
         joints: Joint names.
         stores: Energies (N, 4), J.
@@ -211,28 +215,43 @@ def audit(
         stated: What the controller states about itself; None if nothing.
     """
     flows = {name: joint[:, k] for k, name in enumerate(JOINT_FLOWS)}
-    drive = flows["command"] - flows["damping"]
-    error = residual(stores, joint, scalar)
+    command, damping = flows["command"], flows["damping"]
+    error, shaping, slack = (store.zeros(len(time)) for _ in range(3))
+    s_0 = 0.0
+    for rows in blocks(len(time)):
+        drive = command[rows] - damping[rows]
+        s_j = stores[rows, :MOTOR_STORE].sum(axis=1) + 0.5 * theta_dot[rows] ** 2 @ shaped_inertia
+        s_0 = s_j[0] if rows.start == 0 else s_0
+        error[rows] = residual(stores[rows], joint[rows], scalar[rows], stores[:1].sum())
+        shaping[rows] = (flows["motor_work"][rows] - ratio * drive).sum(axis=1)
+        slack[rows] = drive.sum(axis=1) + scalar[rows, DISTURBANCE] - (s_j - s_0)
+        release(joint, stores, scalar, theta_dot)
     spent = float(np.abs(error).max(initial=0.0))
     tolerance = 2.0 * spent + 1e-9 * float(throughput[-1]) + 1e-12 if time.size else 0.0
-    s_j = stores[:, :3].sum(axis=1) + 0.5 * theta_dot**2 @ shaped_inertia
-    joint_slack = drive.sum(axis=1) + scalar[:, 3] - (s_j - s_j[:1])
     control = delay = injection = own = None
     if stated is not None:
-        late = flows["command"] - stated.work
-        injection = late.sum(axis=1)
-        own = stated.work.sum(axis=1) + stated.storage - stated.storage[:1]
-        damped = flows["damping"].sum(axis=1)
-        control = _observe(time, damped - injection - own, drive, joints, tolerance)
-        delay = _observe(
-            time, damped - injection, late - flows["damping"], joints, tolerance + stated.rough
+        work, potential = stated.work, stated.storage
+        injection, own, of_control, of_delay = (store.zeros(len(time)) for _ in range(4))
+        for rows in blocks(len(time)):
+            given = work[rows].sum(axis=1)
+            injection[rows] = (command[rows] - work[rows]).sum(axis=1)
+            own[rows] = given + potential[rows] - potential[:1]
+            of_delay[rows] = damping[rows].sum(axis=1) - injection[rows]
+            of_control[rows] = of_delay[rows] - own[rows]
+            release(joint, work)
+        control = _observe(
+            time, of_control, lambda row: command[row] - damping[row], joints, tolerance
         )
+        delay = _observe(
+            time, of_delay, lambda row: command[row] - work[row] - damping[row], joints,
+            tolerance + stated.rough,
+        )  # fmt: skip
     return Audit(
         time=time,
         stores={name: stores[:, k] for k, name in enumerate(STORES)},
         joint_flows=flows,
         scalar_flows={name: scalar[:, k] for k, name in enumerate(SCALAR_FLOWS)},
-        inertia_shaping=(flows["motor_work"] - ratio * drive).sum(axis=1),
+        inertia_shaping=shaping,
         residual=error,
         throughput=throughput,
         controller_storage=None if stated is None else stated.storage,
@@ -242,21 +261,28 @@ def audit(
         delay_injection=injection,
         law_injection=own,
         injection_error=None if stated is None else stated.rough,
-        joint_side=_observe(time, joint_slack, -drive, joints, tolerance),
+        joint_side=_observe(
+            time, slack, lambda row: damping[row] - command[row], joints, tolerance
+        ),
         controller_side=control,
         delay_side=delay,
     )
 
 
 def _observe(
-    time: Array, slack: Array, delivered: Array, joints: tuple[str, ...], tolerance: float
+    time: Array,
+    slack: Array,
+    delivered: Callable[[int], Array],
+    joints: tuple[str, ...],
+    tolerance: float,
 ) -> Passivity:
+    """State a side's passivity; `delivered` is the energy (n,) that it has given until a row."""
     broken = np.flatnonzero(slack < -tolerance)
     first = int(broken[0]) if broken.size else None
     return Passivity(
         slack=slack,
         passive=first is None,
         first_violation=None if first is None else float(time[first]),
-        joint=None if first is None else joints[int(delivered[first].argmax())],
+        joint=None if first is None else joints[int(delivered(first).argmax())],
         tolerance=tolerance,
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sealag.simulation._store import blocks, release
 from sealag.typing import Array
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -32,18 +33,26 @@ def delay_store(
 def _store(time: Array, theta: Array, theta_dot: Array, Y: Array, delay: float, at: Array) -> Array:
     """V_4 at instants (A,): ∫(ξ − t + d) p dξ = d P(t) − PP(t) + PP(t − d), P = ∫p, PP = ∫P."""
     step = np.diff(time)
-    whole = _integrals(theta, theta_dot, Y, np.arange(len(step)), step, step)
-    P = np.concatenate([[0.0], np.cumsum(whole[0])])
-    PP = np.concatenate([[0.0], np.cumsum(whole[1] + P[:-1] * step)])
+    P, PP, stored = np.zeros(len(time)), np.zeros(len(time)), np.zeros(len(at))
+    for rows in blocks(len(step)):
+        later = slice(rows.start + 1, rows.stop + 1)
+        part = np.arange(rows.start, rows.stop)
+        once, twice = _integrals(theta, theta_dot, Y, part, step[rows], step[rows])
+        P[later] = P[rows.start] + np.cumsum(once)
+        PP[later] = PP[rows.start] + np.cumsum(twice + P[rows] * step[rows])
+        release(theta, theta_dot)
 
     def both(t: Array) -> tuple[Array, Array]:
         row = np.clip(np.searchsorted(time, t, "right") - 1, 0, len(step) - 1)
         part = np.clip(t - time[row], 0.0, None)
-        more = _integrals(theta, theta_dot, Y, row, step[row], part)
-        return P[row] + more[0], PP[row] + P[row] * part + more[1]
+        once, twice = _integrals(theta, theta_dot, Y, row, step[row], part)
+        return P[row] + once, PP[row] + P[row] * part + twice
 
-    now, before = both(at), both(at - delay)
-    return (delay * now[0] - now[1] + before[1]) / (2.0 * delay)
+    for rows in blocks(len(at)):
+        (P_now, PP_now), (_, PP_before) = both(at[rows]), both(at[rows] - delay)
+        stored[rows] = (delay * P_now - PP_now + PP_before) / (2.0 * delay)
+        release(theta, theta_dot)
+    return stored
 
 
 def _integrals(

@@ -5,8 +5,11 @@ from typing import Self
 
 import numpy as np
 
+from sealag.errors import InputError
 from sealag.simulation._network import Clock, Network
 from sealag.typing import Array, IntArray
+
+MOST_PACKETS = 2e7  # each takes about 130 bytes while their ways are planned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +59,16 @@ class Exchanges:
             clock: The periods.
             duration: Of the run, s.
             seed: Of jitter and losses; a longer run begins like a shorter one.
+
+        Raises:
+            InputError: There are too many packets.
         """
+        packets = duration / min(clock.central, clock.embedded or clock.central)
+        if packets > MOST_PACKETS:
+            raise InputError(
+                f"The run would plan the ways of {packets:.3g} packets, of {MOST_PACKETS:.3g} at "
+                f"most; simulate for at most {duration * MOST_PACKETS / packets:.0f} s."
+            )
         up, down, drive, torque = (
             np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(4)
         )

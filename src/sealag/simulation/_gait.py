@@ -67,7 +67,9 @@ class MeasuredGait:
             walking: What was asked for.
         """
         at = robot.workspace()
-        com = np.array([at.center_of_mass(q) for q in run.q])
+        com = np.empty((len(run.time), 3))
+        for row, q in enumerate(run.q):
+            com[row] = at.center_of_mass(q)
         times, sides = _footholds(run, walking)
         index = np.minimum(np.searchsorted(run.time, times), len(run.time) - 1)
         place = np.array(

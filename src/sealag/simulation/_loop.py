@@ -13,13 +13,14 @@ from sealag.robot import Robot
 from sealag.simulation._audit import Stated, UndelayedWork, audit
 from sealag.simulation._exchange import Exchanges
 from sealag.simulation._interrupt import Interrupt
-from sealag.simulation._memory import empty_log, events_of, open_channels
+from sealag.simulation._memory import events_of, open_channels, open_log
 from sealag.simulation._network import Clock, Network
 from sealag.simulation._outcome import Outcome, PlantStop
 from sealag.simulation._plant import FASTEST, Plant
 from sealag.simulation._run import Run
 from sealag.simulation._scene import Scene
 from sealag.simulation._start import Start
+from sealag.simulation._store import release
 from sealag.typing import Array
 from sealag.whole_body import (
     Measurement,
@@ -188,7 +189,7 @@ class _Loop:
         """Lay out all that happens: loads, samples, ticks and takings, and what is logged."""
         kernel, step = self._kernel, self.clock.physics
         self.plant.held.command[:], self.plant.held.known_torque[:] = self.first, 0.0
-        self._log = empty_log(self.plant, -(-steps // every) + 1)  # too long a run ends here
+        self._log, self._store = open_log(self.plant, -(-steps // every) + 1)  # too long ends here
         ways = Exchanges.plan(self._network, self.clock, duration=steps * step, seed=self.seed)
         self.exchanges = ways
         self._periods = kernel.Periods(
@@ -270,8 +271,10 @@ class _Loop:
             interrupt.check()
             why, plant.time, cursor = plant.glide(course, cursor, self._said)
             time, step, event, part = cursor
-            if progress is not None and step > shown:  # what was there then is logged
-                progress(plant.time)
+            if step > shown:  # what was there then is logged
+                release(*self._log)
+                if progress is not None:
+                    progress(plant.time)
                 shown = step - step % every + every
             if why == kernel.END:
                 return
@@ -373,6 +376,7 @@ class _Loop:
             ages=ways.ages(self.plant.time),
             events=tuple(self.plant.events),
             audit=audit(
+                store=self._store,
                 time=log.time,
                 joints=joints,
                 stores=log.stores,

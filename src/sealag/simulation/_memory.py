@@ -2,22 +2,31 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sealag.simulation._exchange import Exchanges
 from sealag.simulation._plant import Plant
-from sealag.simulation._run import refuse_large
 from sealag.simulation._scene import Push
-from sealag.typing import Array, IntArray
+from sealag.simulation._store import Store
+from sealag.typing import Array
 
 if TYPE_CHECKING:
     from sealag.kernels.run import Channels, Log
 
 
-def events_of(ways: Exchanges, pushes: Sequence[Push]) -> tuple[Array, IntArray, IntArray]:
-    """Return instants (E,), kinds and ticks of all that happens between the steps, in order.
+class Events(NamedTuple):
+    """What happens between the steps."""
+
+    due: Array  # (E,) instants, s, increasing
+    kind: NDArray[np.int8]  # (E,) LOAD, SAMPLE, TICK or TAKE
+    tick: NDArray[np.int32]  # (E,) whose sample, or whose command
+
+
+def events_of(ways: Exchanges, pushes: Sequence[Push]) -> Events:
+    """Return all that happens between the steps, in order.
 
     Args:
         ways: The packets' ways: samples, ticks and takings.
@@ -26,21 +35,27 @@ def events_of(ways: Exchanges, pushes: Sequence[Push]) -> tuple[Array, IntArray,
     from sealag.kernels.run import LOAD, SAMPLE, TAKE, TICK
 
     edges = np.unique([t for p in pushes for t in (p.start, p.start + p.duration)])
-    numbers = np.arange(len(ways.tick))
-    parts = (
-        (edges, LOAD, np.zeros(len(edges))), (ways.seen, SAMPLE, numbers),
-        (ways.tick, TICK, numbers), (ways.taken, TAKE, ways.command),
-    )  # fmt: skip
-    time = np.concatenate([at for at, _, _ in parts])
-    kind = np.concatenate([np.full(len(at), kind) for at, kind, _ in parts]).astype(np.int64)
-    tick = np.concatenate([number for _, _, number in parts]).astype(np.int64)
-    order = np.lexsort((kind, time))
-    return time[order], kind[order], tick[order]
+    samples = np.argsort(ways.seen, kind="stable")
+    parts = {
+        LOAD: (edges, 0),
+        SAMPLE: (ways.seen[samples], samples),
+        TICK: (ways.tick, np.arange(len(ways.tick))),
+        TAKE: (ways.taken, ways.command),
+    }
+    count = sum(len(instants) for instants, _ in parts.values())
+    due, kind, tick = np.empty(count), np.empty(count, np.int8), np.empty(count, np.int32)
+    for what, (instants, whose) in parts.items():
+        place = np.arange(len(instants))
+        for other, (others, _) in parts.items():
+            if other != what:  # of what happens at one instant, the smaller kind comes first
+                place += np.searchsorted(others, instants, "right" if other < what else "left")
+        due[place], kind[place], tick[place] = instants, what, whose
+    return Events(due=due, kind=kind, tick=tick)
 
 
 def open_channels(
     ways: Exchanges,
-    events: tuple[Array, IntArray, IntArray],
+    events: Events,
     torque_period: float,
     *,
     first: Array,
@@ -52,7 +67,7 @@ def open_channels(
 
     Args:
         ways: The packets' ways.
-        events: Instants (E,), kinds and ticks of all events, in order.
+        events: All events, in order.
         torque_period: Time between two looks for the spring torque, s.
         first: First command (n,), Nm.
         torque: First spring torques (n,), Nm.
@@ -61,7 +76,6 @@ def open_channels(
     """
     from sealag.kernels.run import Channels
 
-    due, kind, tick = events
     # How many ticks a command may lie before the drives take it, and a sample before a tick.
     issued = np.searchsorted(ways.tick, ways.taken, "right")
     depth = int((issued - ways.command).max(initial=0)) + 1
@@ -71,9 +85,9 @@ def open_channels(
     if len(known):
         late = float((torque_period * np.arange(len(known)) - known).max() / torque_period)
     return Channels(
-        due=due,
-        kind=kind,
-        tick=tick,
+        due=events.due,
+        kind=events.kind,
+        tick=events.tick,
         samples=np.zeros((int(waiting.max(initial=0)) + 1, row)),
         commands=np.zeros((depth, len(first))),
         sent=first.copy(),
@@ -86,21 +100,24 @@ def open_channels(
     )
 
 
-def empty_log(plant: Plant, rows: int) -> "Log":
+def open_log(plant: Plant, rows: int) -> tuple["Log", Store]:
     """Allocate the log of a run; NaN is the time of a row that is not written yet.
 
     Args:
         plant: The plant.
         rows: How many instants there will be at most.
 
+    Returns:
+        The log, and where its arrays lie.
+
     Raises:
-        InputError: It would not fit into memory.
+        InputError: It would not fit.
     """
     from sealag.kernels.run import allocate_log, log_shapes
 
     robot = plant.robot
     shapes = log_shapes(robot.nq, robot.nv, robot.n, points=plant.surroundings.count)
-    refuse_large(rows, sum(math.prod(shape) for shape in shapes.values()))
-    log = allocate_log(rows, shapes)
+    store = Store.of(rows, sum(math.prod(shape) for shape in shapes.values()))
+    log = allocate_log(rows, shapes, store.zeros)
     log.time[:] = np.nan
-    return log
+    return log, store

@@ -1,21 +1,23 @@
 """What a run leaves behind: arrays over its logged instants, its events and its end."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sealag.errors import InputError
 from sealag.simulation._audit import Audit
 from sealag.simulation._delay_store import delay_store
 from sealag.simulation._exchange import Ages
 from sealag.simulation._outcome import Outcome
 from sealag.simulation._plant import ContactEvent
+from sealag.simulation._store import blocks, release
 from sealag.typing import Array, IntArray
-
-LARGEST_LOG_BYTES = 4_000_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
     """A simulated run, N logged instants; SI units.
+
+    The arrays of a large run lie in files without a name in the temporary folder and are read as
+    they are used; `blocks` goes through them in little memory.
 
     Attributes:
         outcome: How it ended.
@@ -75,21 +77,18 @@ class Run:
         """
         return delay_store(self.time, self.theta, self.theta_dot, Y, delay=delay)
 
+    def blocks(self, rows: int = 500) -> Iterator[slice]:
+        """Go through the rows block by block, in little memory however long the run is.
 
-def refuse_large(rows: int, numbers: int) -> None:
-    """Refuse a log that would not fit into memory.
+        Args:
+            rows: How many rows a block has at most.
 
-    Args:
-        rows: How many instants there will be at most.
-        numbers: How many numbers each has.
-
-    Raises:
-        InputError: It would not.
-    """
-    size = 8 * rows * numbers
-    if size > LARGEST_LOG_BYTES:
-        raise InputError(
-            f"The run would record {rows:.4g} instants in {size / 1e9:.4g} GB of memory, more "
-            f"than {LARGEST_LOG_BYTES / 1e9:g} GB; log less often (simulation.log_period_ms, "
-            "--log-ms), or simulate for a shorter time."
-        )
+        Yields:
+            The rows of a block, as in ``run.theta[rows]``.
+        """
+        for block in blocks(len(self.time), rows):
+            yield block
+            for part in (self, self.audit):
+                for name in part.__dataclass_fields__:
+                    value = getattr(part, name)
+                    release(*value.values() if isinstance(value, dict) else [value])
