@@ -14,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 from typing import BinaryIO, Self
 
-from sealag.errors import FileError, UnknownNameError, either
+from sealag.errors import FileError, SealagError, UnknownNameError, either
 
 _PATIENCE = 10.0  # s that a file that is written at once waits for another writer of it
 _POLL = 0.05  # s
@@ -35,22 +35,44 @@ def read_whole(path: Path, *, what: str, largest: int) -> bytes:
     Raises:
         FileError: it is missing, unreadable, too large, or not a regular file.
     """
+    with opened(path, what=what, largest=largest) as file:
+        # Not `largest`: Python would make room for all of it before it reads.
+        content = file.read(min(os.fstat(file.fileno()).st_size or largest, largest) + 1)
+    if len(content) > largest:
+        raise _too_large(what, path, largest)
+    return content
+
+
+@contextmanager
+def opened(path: Path, *, what: str, largest: int) -> Iterator[BinaryIO]:
+    """Open a regular file that has at most a given size, to read it bit by bit.
+
+    Args:
+        path: the file.
+        what: what messages call it, such as "the project file".
+        largest: bytes.
+
+    Raises:
+        FileError: it is missing, unreadable, too large, or not a regular file.
+    """
     try:
         with open(path, "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise FileError(f"{what} {path} is not a regular file.")
-            # Not `largest`: Python would make room for all of it before it reads.
-            content = file.read(min(status.st_size or largest, largest) + 1)
+            if status.st_size > largest:
+                raise _too_large(what, path, largest)
+            yield file
+    except SealagError:
+        raise
     except OSError as error:
-        if isinstance(error, FileError):
-            raise
         raise FileError(f"{what} {path} cannot be read: {error.strerror or error}.") from error
     except ValueError as error:
         raise FileError(f"{what} {str(path)!r} cannot be read: {error}.") from error
-    if len(content) > largest:
-        raise FileError(f"{what} {path} is larger than {largest / 1e6:g} MB.")
-    return content
+
+
+def _too_large(what: str, path: Path, largest: int) -> FileError:
+    return FileError(f"{what} {path} is larger than {largest / 1e6:g} MB.")
 
 
 def check_output(path: Path, *inputs: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 import sealag
 from helpers.small_systems import arm, arm_system, joint_task
 from sealag.design import (
+    Along,
     certified_bounds,
     load,
     load_motion,
@@ -86,10 +87,9 @@ def swinging(folder, *, count=40, signal=None, gravity="planned", tasks=None):
 
 def decided(system, motion, *, share=1.0, refuse=False):
     """What is known, with bounds that are scaled, or taken away."""
-    spaces = system.spaces(motion)
-    bounds = certified_bounds(spaces, system)
+    bounds = certified_bounds(system.spaces(motion), system)
     delay = 0.0 * bounds.delay if refuse else share * bounds.delay
-    return local_of(system, motion, spaces, delay), bounds
+    return local_of(Along(system=system, motion=motion), delay), bounds
 
 
 @pytest.mark.parametrize("gravity", ["feedback", "planned"])
@@ -99,7 +99,7 @@ def test_what_bounds_decide_agrees_with_deciding_all(tmp_path, gravity):
     whole, _ = decided(system, motion, refuse=True)
     assert whole.count(Basis.EXACT) == len(motion)
     each = [margin_of(system.frozen(motion, k)).delay for k in range(len(motion))]
-    np.testing.assert_allclose([one.delay for one in whole.instants], each, rtol=1e-9)
+    np.testing.assert_allclose(whole.delay, each, rtol=1e-9)
     assert 0 < pruned.count(Basis.EXACT) < len(motion) / 4
     assert pruned.count(Basis.SEARCHED) > 0
     assert (pruned.count(Basis.BOUND) > 0) == (gravity == "planned")
@@ -107,24 +107,23 @@ def test_what_bounds_decide_agrees_with_deciding_all(tmp_path, gravity):
     assert pruned.margin_s == pytest.approx(whole.margin_s, rel=1e-6)
     assert pruned.critical == whole.critical == int(np.argmin(each))
     assert pruned.stable is whole.stable is True
-    for one, bound, margin in zip(pruned.instants, bounds.delay, each):
-        if one.basis is Basis.BOUND:
-            assert one.delay == bound <= margin
+    for basis, delay, bound, margin in zip(pruned.basis, pruned.delay, bounds.delay, each):
+        if basis is Basis.BOUND:
+            assert delay == bound <= margin
             assert bound >= pruned.margin_s, "else it had to be looked at"
-        elif one.basis is Basis.SEARCHED:
-            assert pruned.margin_s <= one.delay <= margin
+        elif basis is Basis.SEARCHED:
+            assert pruned.margin_s <= delay <= margin
         else:
-            assert one.delay == pytest.approx(margin, rel=1e-6)
+            assert delay == pytest.approx(margin, rel=1e-6)
 
 
 def test_bounds_that_are_too_long_hide_the_critical_instant(tmp_path):
     """Negative control: the comparison above sees a wrong bound."""
     system, motion = swinging(tmp_path)
     whole, bounds = decided(system, motion, refuse=True)
-    spaces = system.spaces(motion)
     wrong = bounds.delay.copy()
     wrong[whole.critical] *= 100.0
-    hidden = local_of(system, motion, spaces, wrong)
+    hidden = local_of(Along(system=system, motion=motion), wrong)
     assert hidden.critical != whole.critical
     assert hidden.margin_s > whole.margin_s
 
@@ -171,7 +170,7 @@ def test_one_unstable_instant_makes_the_motion_unstable(tmp_path):
     each = [margin_of(system.frozen(motion, k)).unstable_roots for k in range(len(motion))]
     assert 0 in each
     assert max(each) > 0
-    assert [one.unstable_roots for one in local.instants] == each
+    assert local.unstable_roots.tolist() == each
     assert local.stable is False
     assert local.margin_s == 0.0
     assert local.unstable_modes == max(each)

@@ -1,5 +1,6 @@
 """The user's project file, motions in and out, and the certificate of a design."""
 
+from sealag.design._along import Along
 from sealag.design._certify import certify, check_question
 from sealag.design._criteria import certified_bounds
 from sealag.design._local import local_of, margin_of
@@ -12,6 +13,7 @@ from sealag.design._starter import starter_project
 from sealag.design._system import System
 
 __all__ = [
+    "Along",
     "System",
     "certified_bounds",
     "certify",

@@ -6,13 +6,13 @@ from importlib.metadata import version
 
 import numpy as np
 
+from sealag.design._along import Along
 from sealag.design._assumptions import assumptions_of
 from sealag.design._criteria import (
-    certified_bounds,
+    bounds_along,
     common_bound,
     delayed_stiffness,
     prove_instants,
-    published_bounds,
     stated_windows,
     time_varying_bound,
 )
@@ -38,7 +38,9 @@ from sealag.typing import Array
 from sealag.units import time_text
 from sealag.version import __version__
 from sealag.whole_body import Rest as Equilibrium
-from sealag.whole_body import Spaces, relative_asymmetry
+
+MOST_INSTANTS = 1_400_000
+"""Instants of one certificate: its file has at most 100 MB, and up to 70 bytes an instant."""
 
 PROOF_COUNT = 12
 """Instants whose numbers a certificate holds if nothing else is asked for."""
@@ -52,10 +54,11 @@ class _Case:
         system: the design.
         motion: its instants.
         kind: the criterion.
-        spaces: the law's matrices.
-        F: (N, n, n) delayed stiffness of the criterion, Nm/rad.
+        asymmetry: largest relative asymmetry of the criterion's stiffness.
+        contraction: largest contraction factor of q̄(θ).
+        F: (n, n) delayed stiffness of the criterion at the worst instant, Nm/rad.
         bound: of each instant by the criterion, as far as it is proven.
-        published: of each instant by (29) or (31).
+        published: smallest bound by (29) or (31), s.
         common: with one multiplier for the whole motion; None if it was not asked for.
         time_varying: inside polytopes; None if it was not asked for.
         proofs: of instants.
@@ -66,10 +69,11 @@ class _Case:
     system: System
     motion: Motion
     kind: Criterion
-    spaces: Spaces
+    asymmetry: float
+    contraction: float
     F: Array
     bound: Bound
-    published: Bound
+    published: float
     common: Bound | None
     time_varying: Bound | None
     proofs: tuple[InstantProof, ...]
@@ -101,7 +105,7 @@ class _Case:
             return float(self.bound.upper[self.worst])
         y = self.worst_motion
         power = float(self.system.actuators.motor_damping @ np.abs(y) ** 2)
-        passed = max(float(abs(y.conj() @ self.F[self.worst] @ y)), 1e-300)
+        passed = max(float(abs(y.conj() @ self.F @ y)), 1e-300)
         return power / passed * (1.0 + 1e-13)
 
 
@@ -145,17 +149,15 @@ def certify(
     kind = check_question(system, motion, criterion, time_varying=time_varying, proofs=proofs)
     motion = system.still() if motion is None else motion
     rest = system.rest(motion) if len(motion) == 1 else None
-    spaces = system.spaces(motion)
-    published = published_bounds(spaces, system, solver=solver)
-    passive = certified_bounds(spaces, system, rest, motion)
+    along = Along(system=system, motion=motion)
+    bounds = bounds_along(along, kind, rest=rest, published=True, solver=solver)
     printed = kind is Criterion.PUBLISHED
-    bound, common, moving = published if printed else passive, None, None
+    bound, common, moving = bounds.bound, None, None
     if not printed and len(motion) > 1 and not bound.refusals:
         common = common_bound(bound, solver=solver)
         moving = time_varying_bound(bound, motion, solver=solver) if time_varying else None
     proven, held = prove_instants(
-        spaces,
-        system,
+        along,
         bound,
         kind=kind,
         count=proofs,
@@ -163,19 +165,21 @@ def certify(
         solver=solver,
     )
     withdrawn = proven is not bound
-    decided = np.zeros(len(motion)) if printed else passive.delay
+    decided = np.zeros(len(motion)) if printed else bound.delay
+    worst = delayed_stiffness(along.at([int(np.argmin(proven.delay))]), system, kind)
     case = _Case(
         system=system,
         motion=motion,
         kind=kind,
-        spaces=spaces,
-        F=delayed_stiffness(spaces, system, kind),
+        asymmetry=bounds.asymmetry,
+        contraction=bounds.contraction,
+        F=worst[0],
         bound=proven,
-        published=proven if printed else published,
+        published=float(proven.delay.min()) if printed else bounds.published,
         common=None if withdrawn else common,
         time_varying=None if withdrawn else moving,
         proofs=held,
-        local=local_of(system, motion, spaces, decided, rest),
+        local=local_of(along, decided, rest),
         rest=rest,
     )
     return Certificate(question=_question(case), answer=_answer(case), evidence=_evidence(case))
@@ -203,6 +207,11 @@ def check_question(
     """
     if not isinstance(motion, Motion | None):
         raise InputError(f"motion is {motion!r}; load_motion makes a Motion of a file.")
+    if motion is not None and len(motion) > MOST_INSTANTS:
+        raise InputError(
+            f"The motion has {len(motion)} instants; a certificate holds {MOST_INSTANTS} at most. "
+            "Certify parts of the motion, or fewer of its rows."
+        )
     if proofs is not None and not (isinstance(proofs, int) and proofs >= 1):
         raise InputError(f"proofs is {proofs!r}; it must be a whole number from 1 up, or None.")
     name = system.criterion if criterion is None else criterion
@@ -242,9 +251,6 @@ def _question(case: _Case) -> Question:
 def _answer(case: _Case) -> Answer:
     system, local, rest, worst = case.system, case.local, case.rest, case.worst
     reasons = tuple(_reasons(case))
-    asymmetry = case.spaces.asymmetry
-    if case.kind is Criterion.PUBLISHED:
-        asymmetry = relative_asymmetry(case.F)
     power = system.actuators.motor_damping * np.abs(case.worst_motion) ** 2
     shares = (power / power.sum()).tolist()
     return Answer(
@@ -257,9 +263,9 @@ def _answer(case: _Case) -> Answer:
             time_s=float(case.motion.time[worst]),
             direction=dict(zip(system.robot.joints, shares, strict=True)),
         ),
-        asymmetry=_finite(asymmetry.max()),
-        contraction=_finite(case.spaces.contraction.max()),
-        published_max_delay_s=float(case.published.delay.min()),
+        asymmetry=_finite(case.asymmetry),
+        contraction=_finite(case.contraction),
+        published_max_delay_s=case.published,
         common_multiplier_delay_s=float(case.common.delay) if case.common else None,
         time_varying_delay_s=float(case.time_varying.delay) if case.time_varying else None,
         left_open=_left_open(case),
@@ -289,9 +295,9 @@ def _evidence(case: _Case) -> Evidence:
         time_s=case.motion.time,
         bounds_s=tuple(case.bound.delay.tolist()),
         instant_margins_s=tuple(
-            None if np.isnan(one.delay) else one.delay for one in case.local.instants
+            None if np.isnan(delay) else delay for delay in case.local.delay.tolist()
         ),
-        instant_basis=tuple(one.basis for one in case.local.instants),
+        instant_basis=tuple(case.local.basis),
         worst_motion=np.array([y.real, y.imag]),
         proofs=case.proofs,
         common_multiplier=_stated_multiplier(case.common),
@@ -352,13 +358,13 @@ def _reasons(case: _Case) -> list[str]:
 
 def _undercut(case: _Case) -> list[str]:
     """Where the law that runs loses a stability that it has, before its bound."""
-    instants, bounds = case.local.instants, case.bound.delay
-    lost = [k for k in case.local.undercut(bounds) if instants[k].delay > 0.0]
+    margins, bounds = case.local.delay, case.bound.delay
+    lost = [k for k in case.local.undercut(bounds) if margins[k] > 0.0]
     if not lost:
         return []
-    k = min(lost, key=lambda at: instants[at].delay)
+    k = min(lost, key=lambda at: float(margins[at]))
     return [
-        f"the law that runs loses its stability at {time_text(instants[k].delay)} at instant "
+        f"the law that runs loses its stability at {time_text(float(margins[k]))} at instant "
         f"{k}, before its bound of {time_text(float(bounds[k]))}: its matrices change where it "
         "rests with an error, or it answers to motions of the base, and no bound covers that"
     ]

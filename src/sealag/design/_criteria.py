@@ -2,17 +2,20 @@
 the published one ((29), (31))."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from sealag import passivity
+from sealag.design._along import Along
 from sealag.design._system import System
 from sealag.errors import SolverError
-from sealag.passivity import Bound, Criterion, InstantProof, Problem, Solver, Window, solve
+from sealag.passivity import Bound, Criterion, InstantProof, Joined, Problem, Solver, Window, solve
 from sealag.robot import Motion
+from sealag.store import Store, release
 from sealag.typing import Array, BoolArray
 from sealag.units import time_text
-from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError
+from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError, relative_asymmetry
 
 ASYMMETRY_TOLERANCE = 1e-7
 """Relative asymmetry up to which a stiffness counts as symmetric: rounding, and the error of the
@@ -50,66 +53,194 @@ def certified_bounds(
     Returns:
         The bound of each instant, 0 where a condition fails.
     """
+    conditions = Conditions.room(system, len(spaces))
+    conditions.put(slice(None), spaces)
+    return conditions.refuse(_unconditional(spaces, system), rest, motion)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoundsAlong:
+    """What a criterion says of a motion.
+
+    Attributes:
+        bound: of each instant, 0 where a condition fails.
+        published: smallest bound by (29) or (31), s; NaN if it was not asked for.
+        asymmetry: largest relative asymmetry of the criterion's stiffness.
+        contraction: largest contraction factor of q̄(θ).
+    """
+
+    bound: Bound
+    published: float
+    asymmetry: float
+    contraction: float
+
+
+def bounds_along(
+    along: Along,
+    kind: Criterion,
+    *,
+    rest: Rest | None = None,
+    published: bool = False,
+    solver: Solver | None = None,
+) -> BoundsAlong:
+    """Bound every instant of a motion, however long, as `certified_bounds` or `published_bounds`.
+
+    Args:
+        along: the design and its motion.
+        kind: which of the two.
+        rest: where the loop rests in its posture; None for a motion.
+        published: whether to bound by (29) or (31) beside the certified criterion too.
+        solver: where multipliers of several levels come from; Clarabel's own interface if None.
+    """
+    system, count, printed = along.system, len(along.motion), kind is Criterion.PUBLISHED
+    conditions, whole = Conditions.room(system, count), Joined(count)
+    least, asymmetry = np.inf if published or printed else np.nan, 0.0
+    for rows, spaces in along.parts():
+        if published or printed:
+            part = published_bounds(spaces, system, solver=solver)
+            least = min(least, float(part.delay.min()))
+        if not printed:
+            part = _unconditional(spaces, system)
+        whole.add(rows, part)
+        conditions.put(rows, spaces)
+        F = delayed_stiffness(spaces, system, kind) if printed else None
+        bent = spaces.asymmetry if F is None else relative_asymmetry(F)
+        asymmetry = np.maximum(asymmetry, bent.max())
+    bound = whole.bound if printed else conditions.refuse(whole.bound, rest, along.motion)
+    return BoundsAlong(
+        bound=bound,
+        published=least,
+        asymmetry=float(asymmetry),
+        contraction=float(conditions.contraction.max()),
+    )
+
+
+def _unconditional(spaces: Spaces, system: System) -> Bound:
+    """The bound of each instant if no condition failed."""
     F = delayed_stiffness(spaces, system, Criterion.CERTIFIED)
     problem = Problem.of_stiffness(F, system.actuators.motor_damping)
-    bound = solve(problem, share=passivity.Instant()).eased(PROOF_SHARE)
-    for refused, words in _refusals(spaces, system, rest, motion):
-        if (refused & (bound.delay > 0.0)).any():
-            bound = bound.refused(refused, words)
-    return bound
+    return solve(problem, share=passivity.Instant()).eased(PROOF_SHARE)
 
 
-def _refusals(
-    spaces: Spaces, system: System, rest: Rest | None, motion: Motion | None
-) -> Iterator[tuple[BoolArray, str]]:
-    """Instants (N,) at which a condition of the criterion fails, and which, in words."""
-    count, everywhere = len(spaces), np.ones(len(spaces), dtype=bool)
-    signal = system.law.signal.refusal(spaces.contraction)
-    if signal is not None:
-        yield signal.instants, signal.reason
-    for words in _drive_refusals(system):
-        yield everywhere, words
-    for i, joint in enumerate(system.robot.joints):
-        load, limit = np.abs(spaces.gravity[:, i]), system.actuators.torque_limit[i]
-        if rest is not None:
-            load = np.maximum(load, abs(float(rest.tau_sea[i])))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """What the conditions of the certified criterion measure at N instants.
+
+    Attributes:
+        system: the design.
+        contraction: (N,) contraction factor of q̄(θ).
+        asymmetry: (N,) ‖F_θ − F_θᵀ‖ / ‖F_θ + F_θᵀ‖.
+        singular: (N,) whether a contact or task loses a direction.
+        indefinite: (N,) whether the task stiffness is.
+        load: (N, n) torque that gravity needs, Nm.
+    """
+
+    system: System
+    contraction: Array
+    asymmetry: Array
+    singular: BoolArray
+    indefinite: BoolArray
+    load: Array
+
+    @classmethod
+    def room(cls, system: System, count: int) -> "Conditions":
+        """Return room for what is measured at some instants, to be filled by `put`.
+
+        Args:
+            system: the design.
+            count: how many instants.
+        """
+        n = system.robot.n
+        store = Store.of(count, n, what="A motion", remedy="certify fewer of its instants")
+        return cls(
+            system=system,
+            contraction=np.zeros(count),
+            asymmetry=np.zeros(count),
+            singular=np.zeros(count, dtype=bool),
+            indefinite=np.zeros(count, dtype=bool),
+            load=store.zeros((count, n)),
+        )
+
+    def put(self, rows: slice, spaces: Spaces) -> None:
+        """Measure the conditions at instants of a part of a motion.
+
+        Args:
+            rows: which instants these are.
+            spaces: the law's matrices there.
+        """
+        self.contraction[rows], self.asymmetry[rows] = spaces.contraction, spaces.asymmetry
+        self.singular[rows], self.load[rows] = spaces.singular, np.abs(spaces.gravity)
+        self.indefinite[rows] = ~_semidefinite(spaces.F_task)
+        release(self.load)
+
+    def refuse(self, bound: Bound, rest: Rest | None, motion: Motion | None) -> Bound:
+        """Return a bound with no delay where a condition fails.
+
+        Args:
+            bound: of each instant.
+            rest: where the loop rests in its posture; None for a motion.
+            motion: whose speeds the motors must reach; None for a posture.
+        """
+        for refused, words in self._refusals(rest, motion):
+            if (refused & (bound.delay > 0.0)).any():
+                bound = bound.refused(refused, words)
+        return bound
+
+    def _refusals(
+        self, rest: Rest | None, motion: Motion | None
+    ) -> Iterator[tuple[BoolArray, str]]:
+        """Instants (N,) at which a condition fails, and which, in words."""
+        system, count = self.system, len(self.singular)
+        joints, drives = system.robot.joints, system.actuators
+        signal = system.law.signal.refusal(self.contraction)
+        if signal is not None:
+            yield signal.instants, signal.reason
+        for words in _drive_refusals(system):
+            yield np.ones(count, dtype=bool), words
+        for i, joint in enumerate(joints):
+            load, limit = self.load[:, i], drives.torque_limit[i]
+            if rest is not None:
+                load = np.maximum(load, abs(float(rest.tau_sea[i])))
+            yield (
+                load > limit,
+                (
+                    f"the motor of {joint} gives at most {limit:g} Nm, and gravity needs "
+                    f"{load.max():.3g} Nm at {(load > limit).sum()} of {count} instants"
+                ),
+            )
+        for i, joint in enumerate(joints):
+            limit = drives.velocity_limit[i]
+            rate = np.zeros(count) if motion is None else motion.v[:, system.robot.nv_base + i]
+            speed = np.abs(rate)
+            yield (
+                speed > limit,
+                (
+                    f"the motor of {joint} reaches at most {limit:g} rad/s or m/s, and the motion "
+                    f"needs {speed.max():.3g} at {(speed > limit).sum()} of {count} instants"
+                ),
+            )
         yield (
-            load > limit,
+            self.singular,
             (
-                f"the motor of {joint} gives at most {limit:g} Nm, and gravity needs "
-                f"{load.max():.3g} Nm at {(load > limit).sum()} of {count} instants"
+                f"contacts or tasks lose a direction at {self.singular.sum()} of {count} instants, "
+                "where the Jacobian is singular and the stiffness jumps; certify postures away "
+                "from the singularity"
             ),
         )
-    for i, joint in enumerate(system.robot.joints):
-        limit = system.actuators.velocity_limit[i]
-        speed = np.abs(np.zeros(count) if motion is None else motion.v[:, system.robot.nv_base + i])
+        bent = ~(self.asymmetry <= ASYMMETRY_TOLERANCE)
+        if bent.any():
+            yield (
+                bent,
+                (
+                    f"the fed-back stiffness is not symmetric at {bent.sum()} of {count} instants "
+                    f"(asymmetry up to {self.asymmetry[bent].max():.2e}, from "
+                    f"{_asymmetry_source(system)}), so that it has no potential"
+                ),
+            )
         yield (
-            speed > limit,
-            (
-                f"the motor of {joint} reaches at most {limit:g} rad/s or m/s, and the motion "
-                f"needs {speed.max():.3g} at {(speed > limit).sum()} of {count} instants"
-            ),
+            self.indefinite,
+            f"the task stiffness is indefinite at {self.indefinite.sum()} of {count} instants",
         )
-    yield (
-        spaces.singular,
-        (
-            f"contacts or tasks lose a direction at {spaces.singular.sum()} of {count} instants, "
-            "where the Jacobian is singular and the stiffness jumps; certify postures away from "
-            "the singularity"
-        ),
-    )
-    bent = ~(spaces.asymmetry <= ASYMMETRY_TOLERANCE)
-    if bent.any():
-        yield (
-            bent,
-            (
-                f"the fed-back stiffness is not symmetric at {bent.sum()} of {count} instants "
-                f"(asymmetry up to {spaces.asymmetry[bent].max():.2e}, from "
-                f"{_asymmetry_source(system)}), so that it has no potential"
-            ),
-        )
-    negative = ~_semidefinite(spaces.F_task)
-    yield negative, f"the task stiffness is indefinite at {negative.sum()} of {count} instants"
 
 
 def _drive_refusals(system: System) -> Iterator[str]:
@@ -245,8 +376,7 @@ def stated_windows(bound: Bound, D_theta: Array) -> tuple[Window, ...]:
 
 
 def prove_instants(
-    spaces: Spaces,
-    system: System,
+    along: Along,
     bound: Bound,
     *,
     kind: Criterion,
@@ -257,8 +387,7 @@ def prove_instants(
     """Prove the smallest bounds, and those that bind a shared multiplier.
 
     Args:
-        spaces: the law's matrices.
-        system: the design.
+        along: the design and its motion.
         bound: of the criterion.
         kind: which criterion.
         count: how many of the smallest bounds; None for all.
@@ -268,13 +397,15 @@ def prove_instants(
     Returns:
         The bound, withdrawn where no proof was found, and the proofs.
     """
-    S, F = task_stiffness(spaces, system, kind), delayed_stiffness(spaces, system, kind)
     usable = (bound.delay > 0.0) & np.isfinite(bound.delay)
     order = np.argsort(bound.delay, kind="stable")
     smallest = order[usable[order]][:count].tolist()
     extra = [k for k in binding if usable[k] and k not in set(smallest)]
+    chosen = (*smallest, *extra)
+    spaces, system = along.at(chosen), along.system
+    S, F = task_stiffness(spaces, system, kind), delayed_stiffness(spaces, system, kind)
     proofs, missing = [], dict[int, str]()
-    for k in (*smallest, *extra):
+    for i, k in enumerate(chosen):
         try:
             W = bound.prove(k, solver=solver).blocks
         except SolverError as error:
@@ -285,16 +416,16 @@ def prove_instants(
             InstantProof(
                 instant=k,
                 delay_s=d,
-                J_star=spaces.J_star[k],
-                stiffness=S[k],
-                F_gravity=spaces.F_gravity[k],
-                F=F[k],
+                J_star=spaces.J_star[i],
+                stiffness=S[i],
+                F_gravity=spaces.F_gravity[i],
+                F=F[i],
                 W=W,
                 Q=tuple(block / d for block in W),
             )
         )
     if missing:
         first = min(missing)
-        words = f"{len(missing)} of {len(F)} bounds have no proof, instant {first}: "
+        words = f"{len(missing)} of {len(usable)} bounds have no proof, instant {first}: "
         bound = bound.refused(list(missing), words + missing[first])
     return bound, tuple(proofs)

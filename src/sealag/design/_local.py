@@ -3,15 +3,15 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sealag.design._along import Along
 from sealag.design._criteria import ASYMMETRY_TOLERANCE
-from sealag.design._system import System
 from sealag.errors import ContractionError, SolverError
 from sealag.margin import DelayMargin, delay_margin, rightmost_roots
 from sealag.passivity import Basis, LocalLoop, Place
-from sealag.robot import Motion
-from sealag.typing import Array
-from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, Spaces, sea_loop
+from sealag.typing import Array, BoolArray, IntArray
+from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, sea_loop
 
 MOST_EXACT = 600
 """Instants of a motion that are decided exactly at most; a bound decides the others, or none."""
@@ -40,29 +40,13 @@ rounding; ten times more sends soft but stable postures to the exact decision.""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InstantMargin:
-    """Margin of one instant.
-
-    Attributes:
-        basis: what the margin rests on.
-        delay: margin or its lower bound, s; NaN if open.
-        unstable_roots: roots not in the open left half-plane without delay; 0 if open.
-    """
-
-    basis: Basis
-    delay: float
-    unstable_roots: int = 0
-
-
-OPEN = InstantMargin(basis=Basis.OPEN, delay=float("nan"))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Local:
     """Stability over a motion.
 
     Attributes:
-        instants: margin of each instant.
+        basis: what the margin of each instant rests on, a `Basis` each (N,).
+        delay: margin of each instant or its lower bound, s (N,); NaN if open.
+        unstable_roots: roots not in the open left half-plane without delay (N,); 0 if open.
         critical: the instant with the smallest margin; of those unstable without delay the one with
             most unstable roots.
         margin: its exact margin; None if none could be decided.
@@ -72,7 +56,9 @@ class Local:
         problem: why the critical instant has no margin, in words; empty if it has.
     """
 
-    instants: tuple[InstantMargin, ...]
+    basis: NDArray[np.object_]
+    delay: Array
+    unstable_roots: IntArray
     critical: int
     margin: DelayMargin | None
     loop: FrozenLoop | None
@@ -83,20 +69,20 @@ class Local:
     @property
     def unstable_modes(self) -> int:
         """Most unstable roots without delay over the instants that were decided."""
-        return max(one.unstable_roots for one in self.instants)
+        return int(self.unstable_roots.max())
 
     @property
     def stable(self) -> bool | None:
         """Whether the loop is stable without delay at every instant; None if that is not known."""
-        if self.unstable_modes or any(one.delay == 0.0 for one in self.instants):
+        if self.unstable_modes or (self.delay == 0.0).any():
             return False
-        return None if any(one.basis is Basis.OPEN for one in self.instants) else True
+        return None if (self.basis == Basis.OPEN).any() else True
 
     @property
     def margin_s(self) -> float | None:
         """Smallest margin of the instants that were decided exactly, s; None if there is none."""
-        exact = [one.delay for one in self.instants if one.basis is Basis.EXACT]
-        return min(exact, default=None)
+        exact = self.delay[self.basis == Basis.EXACT]
+        return float(exact.min()) if len(exact) else None
 
     @property
     def first_crossing_s(self) -> float | None:
@@ -129,11 +115,7 @@ class Local:
         Args:
             bounds: (N,) s.
         """
-        return [
-            k
-            for k, one in enumerate(self.instants)
-            if one.basis is Basis.EXACT and one.delay < bounds[k]
-        ]
+        return np.flatnonzero((self.basis == Basis.EXACT) & (self.delay < bounds)).tolist()
 
     def count(self, basis: Basis) -> int:
         """Return how many instants were decided in a way.
@@ -141,12 +123,10 @@ class Local:
         Args:
             basis: the way.
         """
-        return sum(one.basis is basis for one in self.instants)
+        return int((self.basis == basis).sum())
 
 
-def local_of(
-    system: System, motion: Motion, spaces: Spaces, bounds: Array, rest: Rest | None = None
-) -> Local:
+def local_of(along: Along, bounds: Array, rest: Rest | None = None) -> Local:
     """Decide stability and margin of the law that runs at every instant of a motion.
 
     Each instant is a loop that holds the instant's configuration. It is frozen in that
@@ -158,13 +138,11 @@ def local_of(
     bound lies below the smallest margin so far. All others are decided exactly, up to MOST_EXACT.
 
     Args:
-        system: the design.
-        motion: its instants.
-        spaces: the law's matrices along it.
+        along: the design and its motion.
         bounds: (N,) of the certified criterion, s; 0 where it decides nothing.
         rest: where the loop of the first instant rests, if that is known already.
     """
-    return _Decision(system, motion, spaces, bounds, rest).run()
+    return _Decision(along, bounds, rest).run()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,38 +174,37 @@ class _Known:
 class _Decision:
     """The decision over a motion, instant by instant."""
 
-    def __init__(
-        self,
-        system: System,
-        motion: Motion,
-        spaces: Spaces,
-        bounds: Array,
-        first: Rest | None,
-    ) -> None:
-        self._system, self._motion, self._spaces, self._bounds = system, motion, spaces, bounds
-        self._first = first
-        self._found: list[InstantMargin] = [OPEN] * len(motion)
+    def __init__(self, along: Along, bounds: Array, first: Rest | None) -> None:
+        self._along, self._bounds, self._first = along, bounds, first
+        self._system, self._motion = along.system, along.motion
+        count = len(self._motion)
+        self._basis = np.full(count, Basis.OPEN, dtype=object)
+        self._delay, self._roots = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
+        self._plants = [
+            LinkPlant(self._system.robot, contacts) for contacts in self._motion.contact_sets
+        ]
         self._best: _Known | None = None
         self._critical = 0
 
     def run(self) -> Local:
         count = len(self._motion)
-        minima = self._minima() if count > 1 else {}
-        for k in _spread(np.array([k for k in range(count) if k not in minima]), MOST_EXACT):
+        minimum = self._minima()
+        for k in _spread(np.flatnonzero(~minimum), MOST_EXACT):
             if self._decide(int(k)) and count > _FEW:
                 break
-        for k in minima:
-            delay = float(self._bounds[k])
-            self._found[k] = InstantMargin(basis=Basis.BOUND, delay=delay)
-        for k in sorted(minima, key=lambda at: float(self._bounds[at])):
+        self._basis[minimum], self._delay[minimum] = Basis.BOUND, self._bounds[minimum]
+        minima = np.flatnonzero(minimum)
+        minima = minima[np.argsort(self._bounds[minima], kind="stable")]
+        for k in minima.tolist():
             if self._best is not None and self._bounds[k] >= self._least():
                 break
-            self._search(k, minima[k])
+            self._search(k)
         if self._best is None:  # no search came to an end
-            self._decide(min(minima, key=lambda at: float(self._bounds[at])))
+            self._decide(int(minima[0]))
         assert self._best is not None
         return Local(
-            instants=tuple(self._found), critical=self._critical, margin=self._best.margin,
+            basis=self._basis, delay=self._delay, unstable_roots=self._roots,
+            critical=self._critical, margin=self._best.margin,
             loop=self._best.loop, at=self._best.at, rest=self._best.rest,
             problem=self._best.problem,
         )  # fmt: skip
@@ -235,30 +212,34 @@ class _Decision:
     def _least(self) -> float:
         return np.inf if self._best is None or self._best.delay is None else self._best.delay
 
-    def _search(self, k: int, links: FreeLinks) -> None:
+    def _found(self, k: int, basis: Basis, delay: float, roots: int = 0) -> None:
+        self._basis[k], self._delay[k], self._roots[k] = basis, delay, roots
+
+    def _search(self, k: int) -> None:
         """Search a loop at a minimum for crossings below the smallest margin so far."""
-        least, robot = self._least(), self._system.robot
+        least, robot, spaces = self._least(), self._system.robot, self._along.at([k])
+        links = self._links(k, spaces.gravity[0])
         loop = sea_loop(
             self._system.actuators,
             M=links.M,
             H=links.H,
             S=links.Z[robot.nv_base :],
             C_z=np.zeros((robot.n, links.Z.shape[1])),
-            C_theta=-self._spaces.F_theta[k],
+            C_theta=-spaces.F_theta[0],
             joint_damping=robot.damping,
         )
         try:
             margin = margin_of(loop, at_most=None if np.isinf(least) else least)
         except SolverError:
-            self._found[k] = OPEN
+            self._found(k, Basis.OPEN, np.nan)
             return
         if margin.delay < least or np.isinf(least):
-            self._found[k] = InstantMargin(basis=Basis.EXACT, delay=float(margin.delay))
+            self._found(k, Basis.EXACT, float(margin.delay))
             rest = self._system.in_posture(self._motion, k)
             self._best = _Known(margin=margin, loop=loop, at=Place.POSTURE, rest=rest, problem="")
             self._critical = k
         else:
-            self._found[k] = InstantMargin(basis=Basis.SEARCHED, delay=least)
+            self._found(k, Basis.SEARCHED, least)
 
     def _rest_of(self, k: int) -> Rest:
         """Where the loop that holds an instant rests."""
@@ -276,9 +257,7 @@ class _Decision:
         worst = min(known, key=_Known.order)
         unstable = worst.delay == 0.0
         if worst.delay is not None:
-            self._found[k] = InstantMargin(
-                basis=Basis.EXACT, delay=worst.delay, unstable_roots=worst.roots
-            )
+            self._found(k, Basis.EXACT, worst.delay, worst.roots)
         if self._best is None or worst.order() < self._best.order():
             self._best, self._critical = worst, k
         return unstable
@@ -286,7 +265,8 @@ class _Decision:
     def _at(self, k: int, at: Place, state: Rest) -> "_Known":
         """The loop of an instant, frozen at a state, and its margin."""
         loop, margin, problem = None, None, state.reason
-        singular = bool(self._spaces.singular[k]) and np.allclose(state.q, self._motion.q[k])
+        singular = bool(self._along.at([k]).singular[0])
+        singular &= np.allclose(state.q, self._motion.q[k])
         try:
             loop = self._system.frozen(
                 self._motion, k, rest=state, beside=_BESIDE if singular else None
@@ -303,37 +283,39 @@ class _Decision:
             problem = problem or str(error)
         return _Known(margin=margin, loop=loop, at=at, rest=state, problem=problem)
 
-    def _minima(self) -> dict[int, FreeLinks]:
-        """Links at the instants that a potential decides: stable, with a margin above the bound."""
-        system, spaces = self._system, self._spaces
-        good = (self._bounds > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
-        if not (system.law.rests_at_posture and system.ideal_drives):
-            return {}
-        plants = [LinkPlant(system.robot, contacts) for contacts in self._motion.contact_sets]
-        found = {}
-        for k in np.flatnonzero(good).tolist():
-            links = self._minimum(plants[self._motion.contact_index[k]], k)
-            if links is not None:
-                found[k] = links
+    def _minima(self) -> BoolArray:
+        """Instants (N,) of a motion that a potential decides: stable, with a margin above the
+        bound."""
+        system, found = self._system, np.zeros(len(self._motion), dtype=bool)
+        if len(found) == 1 or not (system.law.rests_at_posture and system.ideal_drives):
+            return found
+        for rows, spaces in self._along.parts():
+            good = (self._bounds[rows] > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)
+            for i in np.flatnonzero(good).tolist():
+                k = rows.start + i
+                found[k] = self._is_minimum(k, spaces.gravity[i], spaces.F_theta[i])
         return found
 
-    def _minimum(self, plant: LinkPlant, k: int) -> FreeLinks | None:
-        """Links where the loop rests at the instant, in a strict minimum of the whole potential,
-        and joints determine all motions, so that the command is −F_θ δθ alone; else None."""
-        system, q, springs = self._system, self._motion.q[k], self._spaces.gravity[k]
-        links = plant.free(q, springs)
+    def _links(self, k: int, springs: Array) -> FreeLinks:
+        """The links under springs (n,), Nm, at an instant."""
+        plant = self._plants[self._motion.contact_index[k]]
+        return plant.free(self._motion.q[k], springs)
+
+    def _is_minimum(self, k: int, springs: Array, F: Array) -> bool:
+        """Whether the loop rests at the instant, in a strict minimum of the whole potential, and
+        joints determine all motions, so that the command is −F_θ δθ alone."""
+        system, links = self._system, self._links(k, springs)
         S, K = links.Z[system.robot.nv_base :], np.diag(system.actuators.spring_stiffness)
-        force = system.robot.gravity(q)
+        force = system.robot.gravity(self._motion.q[k])
         force[system.robot.nv_base :] -= springs
         weight = max(system.robot.weight, float(np.abs(springs).max(initial=0.0)))
         if np.abs(links.Z.T @ force).max(initial=0.0) > _AT_REST * weight:
-            return None
+            return False
         if np.linalg.matrix_rank(S) < S.shape[1]:
-            return None
-        F = self._spaces.F_theta[k]
+            return False
         hessian = np.block([[links.H + S.T @ K @ S, -S.T @ K], [-K @ S, K + (F + F.T) / 2.0]])
         values = np.linalg.eigvalsh(hessian)
-        return links if values[0] > _MINIMUM * values[-1] else None
+        return bool(values[0] > _MINIMUM * values[-1])
 
 
 def margin_of(loop: FrozenLoop, **choices: object) -> DelayMargin:

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from sealag.design._criteria import certified_bounds
+from sealag.design._along import Along
+from sealag.design._criteria import bounds_along
 from sealag.design._local import local_of, margin_of
 from sealag.design._system import System
 from sealag.errors import ContractionError, InputError, SolverError
 from sealag.margin import Interval
-from sealag.passivity import Basis
+from sealag.passivity import Basis, Criterion
 from sealag.robot import Motion
 
 
@@ -95,9 +96,8 @@ def local_margins(
     if horizon is not None and not (math.isfinite(horizon) and horizon > 0.0):
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
     motion = system.still() if motion is None else motion
-    spaces = system.spaces(motion)
-    bounds = certified_bounds(spaces, system, None, motion).delay
-    local = local_of(system, motion, spaces, bounds)
+    along = Along(system=system, motion=motion)
+    local = local_of(along, bounds_along(along, Criterion.CERTIFIED).bound.delay)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
         raise ContractionError(local.problem)

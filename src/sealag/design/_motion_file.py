@@ -2,16 +2,18 @@
 
 import csv
 import io
+import itertools
 import zipfile
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from sealag.errors import InputError, MotionError
-from sealag.files import read_whole, written_whole
+from sealag.files import opened, written_whole
 from sealag.robot import UNIT_TOLERANCE, Contact, Motion, Robot, require_within_limits
+from sealag.store import Store, blocks, release
 from sealag.typing import Array
 from sealag.units import number_of
 
@@ -20,6 +22,7 @@ BASE_RATES = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
 CONTACT = "contact:"
 VELOCITY = ":velocity"
 LARGEST_BYTES = 2_000_000_000
+_CSV_BLOCK = 10_000  # rows that are lists of Python numbers at a time
 
 
 def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] = ()) -> Motion:
@@ -58,10 +61,14 @@ def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] =
     if missing:
         raise MotionError(f"{path}: the column {missing[0]} is missing ({len(missing)} in all).")
     _check_rows(table, path)
-    q = np.column_stack([table[name] for name in needed[1:]])
     time = table["time_s"]
+    store = Store.of(
+        len(time), robot.nq + robot.nv, what="A motion", remedy="give fewer of its rows"
+    )
+    q = _filled(store, [table[name] for name in needed[1:]])
     if robot.floating_base:
         q[:, 3:7] = _unit(q[:, 3:7], path)
+        release(q)
     try:
         require_within_limits(robot, q)
     except InputError as error:
@@ -70,7 +77,7 @@ def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] =
     return Motion(
         time=time,
         q=q,
-        v=_velocities(table, robot, q, path=path),
+        v=_velocities(table, robot, q, path=path, store=store),
         contact_sets=sets,
         contact_index=index,
     )
@@ -120,14 +127,14 @@ def _read_table(path: Path) -> dict[str, Array]:
         raise MotionError(
             f"{path}: motions end in .csv, .npz or .parquet, not {ending or 'nothing'!r}."
         )
-    content = read_whole(path, what="The motion", largest=LARGEST_BYTES)
-    try:
-        table = _READERS[ending](content, path)
-    except MotionError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split())[:200].rstrip(".")
-        raise MotionError(f"{path} cannot be read as a motion: {reason}.") from error
+    with opened(path, what="The motion", largest=LARGEST_BYTES) as file:
+        try:
+            table = _READERS[ending](file, path)
+        except MotionError:
+            raise
+        except Exception as error:
+            reason = " ".join(str(error).split())[:200].rstrip(".")
+            raise MotionError(f"{path} cannot be read as a motion: {reason}.") from error
     return {name: _column(values, name, path) for name, values in table.items()}
 
 
@@ -142,23 +149,25 @@ def _column(values: Array, name: str, path: Path) -> Array:
     return values.astype(float).ravel()
 
 
-def _read_npz(content: bytes, path: Path) -> dict[str, Array]:
-    if not zipfile.is_zipfile(io.BytesIO(content)):
+def _read_npz(file: BinaryIO, path: Path) -> dict[str, Array]:
+    if not zipfile.is_zipfile(file):
         raise MotionError(f"{path} is not an NPZ file of named columns; np.savez writes one.")
-    data = np.load(io.BytesIO(content), allow_pickle=False)
+    file.seek(0)
+    data = np.load(file, allow_pickle=False)
     return {name: data[name] for name in data}
 
 
-def _read_parquet(content: bytes, path: Path) -> dict[str, Array]:
-    import pyarrow
+def _read_parquet(file: BinaryIO, path: Path) -> dict[str, Array]:
     from pyarrow import parquet
 
-    found = parquet.read_table(pyarrow.BufferReader(content))
-    return {name: found[name].to_numpy() for name in found.column_names}
+    found = parquet.ParquetFile(file)
+    names = found.schema_arrow.names
+    return {name: found.read([name])[name].to_numpy() for name in names}
 
 
-def _read_csv(content: bytes, path: Path) -> dict[str, Array]:
-    lines = csv.reader(content.decode("utf-8-sig").splitlines(), strict=True)
+def _read_csv(file: BinaryIO, path: Path) -> dict[str, Array]:
+    text = io.TextIOWrapper(file, encoding="utf-8-sig", newline="")
+    lines = csv.reader(text, strict=True)
     names = [name.strip() for name in next(lines, [])]
     if not names or number_of(names[0]) is not None:
         raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
@@ -167,47 +176,73 @@ def _read_csv(content: bytes, path: Path) -> dict[str, Array]:
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise MotionError(f"{path}: the column name {twice[0]!r} occurs twice.")
-    rows: list[list[float]] = []
+    whole: list[Array] = []
+    rows = _csv_rows(lines, names, path)
+    while block := list(itertools.islice(rows, _CSV_BLOCK)):
+        whole.append(np.array(block, dtype=float))
+    text.detach()
+    columns = np.concatenate([np.zeros((0, len(names))), *whole])
+    return dict(zip(names, columns.T, strict=True))
+
+
+def _csv_rows(
+    lines: Iterator[list[str]], names: list[str], path: Path
+) -> Iterator[list[float | None]]:
+    """The numbers of each row."""
+    row = 0
     for cells in lines:
         if not cells:
             continue
+        row += 1
         numbers = [number_of(cell) for cell in cells]
         if len(cells) != len(names):
             raise MotionError(
-                f"{path}: row {len(rows) + 1} has {len(cells)} cells, but there are {len(names)} "
+                f"{path}: row {row} has {len(cells)} cells, but there are {len(names)} "
                 "column names; cells are separated by commas, decimals by points."
             )
         if None in numbers:
             at = numbers.index(None)
             raise MotionError(
-                f"{path}: the column {names[at]} is {cells[at]!r} in row {len(rows) + 1}; it must "
+                f"{path}: the column {names[at]} is {cells[at]!r} in row {row}; it must "
                 "be a number."
             )
-        rows.append([number for number in numbers if number is not None])
-    columns = np.array(rows, dtype=float).reshape(-1, len(names)).T
-    return dict(zip(names, columns, strict=True))
+        yield numbers
 
 
 _READERS = {".csv": _read_csv, ".npz": _read_npz, ".parquet": _read_parquet}
 
 
-def _velocities(table: dict[str, Array], robot: Robot, q: Array, *, path: Path) -> Array:
+def _filled(store: Store, columns: list[Array]) -> Array:
+    """The columns side by side, (N, k)."""
+    array = store.zeros((len(columns[0]), len(columns)))
+    for rows in blocks(len(array)):
+        array[rows] = np.column_stack([column[rows] for column in columns])
+        release(array)
+    return array
+
+
+def _velocities(
+    table: dict[str, Array], robot: Robot, q: Array, *, path: Path, store: Store
+) -> Array:
     names = [*(BASE_RATES if robot.floating_base else ()), *(j + VELOCITY for j in robot.joints)]
     missing = [name for name in names if name not in table]
     if not missing:
-        return np.column_stack([table[name] for name in names])
+        return _filled(store, [table[name] for name in names])
     given = [name for name in names if name in table]
     if given:
         raise MotionError(
             f"{path}: the velocity {given[0]} is given without {missing[0]}; give all velocities, "
             "or none, then they are differences of the positions."
         )
-    time, v = table["time_s"], np.zeros((len(q), robot.nv))
-    if len(time) > 1:
-        steps = np.array([robot.difference(a, b) for a, b in pairwise(q)])
-        rates = steps / np.diff(time)[:, None]
-        v[0], v[-1] = rates[0], rates[-1]
-        v[1:-1] = (rates[:-1] + rates[1:]) / 2.0
+    time, v = table["time_s"], store.zeros((len(q), robot.nv))
+    rate = None
+    for rows in blocks(len(time) - 1):
+        for row in range(rows.start, rows.stop):
+            before = rate
+            rate = robot.difference(q[row], q[row + 1]) / (time[row + 1] - time[row])
+            v[row] = rate if before is None else (before + rate) / 2.0
+            v[row + 1] = rate
+        release(q, v)
     return v
 
 

@@ -5,7 +5,7 @@ or polytopes in `Windows` share. A `Certificate` is question, answer and evidenc
 it from its own numbers, without the code that made it.
 """
 
-from sealag.passivity._bound import Bound
+from sealag.passivity._bound import Bound, Joined
 from sealag.passivity._certificate import Certificate, write_certificate
 from sealag.passivity._checks import Check, Verification
 from sealag.passivity._kinds import Basis, Criterion, Place, Status
@@ -33,6 +33,7 @@ __all__ = [
     "Evidence",
     "Instant",
     "InstantProof",
+    "Joined",
     "LocalLoop",
     "Motion",
     "Place",

@@ -173,6 +173,49 @@ class Bound:
         return replace(self, delay=delay, upper=upper, refusals=(*self.refusals, reason))
 
 
+class Joined:
+    """The bound of a motion that is answered part by part, each instant by itself."""
+
+    def __init__(self, count: int) -> None:
+        """Begin.
+
+        Args:
+            count: how many instants there will be.
+        """
+        self._count = count
+        self._whole: Bound | None = None
+        self._least = np.inf
+
+    def add(self, rows: slice, part: Bound) -> None:
+        """Add the next instants.
+
+        Args:
+            rows: which instants these are.
+            part: their bound.
+        """
+        if len(part.delay) == self._count:
+            self._whole = part
+            return
+        if self._whole is None:
+            delay, upper, angle = (np.zeros(self._count) for _ in range(3))
+            problem = part.problem.room(self._count)
+            self._whole = Bound(problem=problem, delay=delay, upper=upper, angle=angle)
+        whole = self._whole
+        whole.problem.put(rows, part.problem)
+        whole.delay[rows], whole.upper[rows], whole._angle[rows] = (
+            part.delay, part.upper, part._angle,
+        )  # fmt: skip
+        if part.delay.min() < self._least:
+            self._least = float(part.delay.min())
+            self._whole = replace(whole, reason=part.reason)
+
+    @property
+    def bound(self) -> Bound:
+        """The bound of all instants."""
+        assert self._whole is not None
+        return self._whole
+
+
 def _extremal(A: Array, angle: Array) -> Array:
     """Eigenvector of λ_max(cos φ S + i sin φ T), S and T the symmetric and skew parts of A."""
     phi = np.asarray(angle)[..., None, None]

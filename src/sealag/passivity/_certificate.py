@@ -1,6 +1,7 @@
 """The certificate: it checks itself, and is written as JSON."""
 
 import hashlib
+import itertools
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -10,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from sealag.errors import FileError
-from sealag.files import Draft, write_text
+from sealag.files import Draft, written_whole
 from sealag.passivity._checks import Check
 from sealag.passivity._claims import claim_checks
 from sealag.passivity._definite import Reader, doubles, rationals
@@ -109,9 +110,12 @@ def content_digest(data: Mapping[str, Any]) -> str:
             equal numbers give equal digests.
     """
     others = {key: value for key, value in data["hashes"].items() if key != "content"}
-    content = {**data, "hashes": others}
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode("utf-8")).hexdigest()
+    content, digest = {**data, "hashes": others}, hashlib.sha256()
+    for mark, key in zip(itertools.chain("{", itertools.repeat(",")), sorted(content)):
+        text = json.dumps(content[key], sort_keys=True, separators=(",", ":"), allow_nan=False)
+        digest.update(f"{mark}{json.dumps(key)}:{text}".encode())
+    digest.update(b"}")
+    return digest.hexdigest()
 
 
 def write_certificate(certificate: Certificate, path: Path | Draft) -> None:
@@ -125,11 +129,15 @@ def write_certificate(certificate: Certificate, path: Path | Draft) -> None:
         FileError: it cannot be written, or is larger than what is read.
     """
     entries = certificate.to_json_dict().items()
-    lines = (f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in entries)
-    text = "{\n" + ",\n".join(lines) + "\n}\n"
-    if len(text) > LARGEST_BYTES:
-        name = path.asked if isinstance(path, Draft) else path
-        raise FileError(
-            f"{name} would be larger than {LARGEST_BYTES / 1e6:g} MB; ask for fewer proofs."
-        )
-    write_text(path, text)
+    with written_whole(path) as file:
+        size = 0
+        for mark, (key, value) in zip(itertools.chain("{", itertools.repeat(",")), entries):
+            line = f"{mark}\n{json.dumps(key)}: {json.dumps(value, allow_nan=False)}".encode()
+            size += len(line)
+            if size > LARGEST_BYTES:
+                name = path.asked if isinstance(path, Draft) else path
+                raise FileError(
+                    f"{name} would be larger than {LARGEST_BYTES / 1e6:g} MB; ask for fewer proofs."
+                )
+            file.write(line)
+        file.write(b"\n}\n")

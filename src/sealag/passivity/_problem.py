@@ -8,14 +8,15 @@ with J = J* D^-½ and M = D^-½ J*ᵀ S. Priority levels are the blocks of W. Th
 J* = I and M = D^-½ F, with one multiplier in joint coordinates (docs/theory section 6).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from sealag.errors import InputError, word
+from sealag.store import Store, blocks, release
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body import StiffnessForm
 
@@ -172,6 +173,50 @@ class Problem:
             M_error=M_error[instants],
             semidefinite=self.semidefinite,
         )
+
+    def parts(self) -> Iterator["Problem"]:
+        """Go through one axis of instants block by block, in little memory however many.
+
+        Yields:
+            The same problem for the next instants.
+        """
+        for rows in blocks(len(self.J)):
+            yield self.at(rows)
+            release(self.J, self.M)
+
+    def room(self, count: int) -> "Problem":
+        """Return a problem with room for more instants, to be filled by `put`.
+
+        Args:
+            count: how many instants.
+        """
+        same_J = self.J.strides[0] == 0  # J* = I, stated once
+        store = Store.of(
+            count,
+            self.M[0].size * (1 if same_J else 2),
+            what="A motion",
+            remedy="certify fewer of its instants",
+        )
+        shape = (count, *self.J.shape[1:])
+        return replace(
+            self,
+            J=np.broadcast_to(self.J[0], shape) if same_J else store.zeros(shape),
+            M=store.zeros((count, *self.M.shape[1:])),
+            A_error=np.zeros((count, len(self.blocks))),
+            M_error=np.zeros((count, len(self.blocks))),
+        )
+
+    def put(self, rows: slice, part: "Problem") -> None:
+        """Fill in instants of a part of a motion.
+
+        Args:
+            rows: which instants these are.
+            part: their problem.
+        """
+        if self.J.strides[0]:
+            self.J[rows] = part.J
+        self.M[rows], self.A_error[rows], self.M_error[rows] = part.M, part.A_error, part.M_error
+        release(self.J, self.M)
 
     def motion(self) -> "Problem":
         """Return the same problem with exactly one axis of instants.

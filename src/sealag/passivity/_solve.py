@@ -203,10 +203,11 @@ class Motion:
         if not 1e-9 <= self.tolerance <= 0.1:
             raise InputError(f"tolerance is {self.tolerance:g}; it must lie in 1e-9 … 0.1.")
         problem = problem.motion()
-        whole = together(problem)
-        found = search(problem, whole.delay, tolerance=self.tolerance, solver=solver)
-        proven = float(proven_delays(problem, found.factor).min())
-        upper = min(found.upper, float(whole.upper.min()))
+        whole = [together(part) for part in problem.parts()]
+        pointwise = np.concatenate([part.delay for part in whole])
+        found = search(problem, pointwise, tolerance=self.tolerance, solver=solver)
+        proven = min(float(proven_delays(part, found.factor).min()) for part in problem.parts())
+        upper = min(found.upper, *(float(part.upper.min()) for part in whole))
         closed = upper <= proven * (1.0 + self.tolerance) or np.isinf(proven)
         return Bound(
             problem=problem,
@@ -225,7 +226,7 @@ def rounding(problem: Problem) -> float:
         problem: one axis of instants.
     """
     error = np.broadcast_to(problem.M_error, (len(problem.J), len(problem.blocks)))
-    sizes = [norm(problem.J[:, rows]).max() for rows in problem.rows]
+    sizes = [max(norm(part.J[:, rows]).max() for part in problem.parts()) for rows in problem.rows]
     return float(sum(size * error[:, k].max() for k, size in enumerate(sizes)))
 
 
@@ -273,7 +274,7 @@ def search(problem: Problem, pointwise: Array, *, tolerance: float, solver: Solv
         factor = factorise(problem, solution.W)
         if factor is None:
             break
-        delays = estimated_delays(problem, factor)
+        delays = np.concatenate([estimated_delays(part, factor) for part in problem.parts()])
         if delays.min() > best_delay:
             best, best_delay = factor, float(delays.min())
         if upper <= best_delay * (1.0 + 0.25 * tolerance) or np.isinf(best_delay):

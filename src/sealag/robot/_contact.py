@@ -1,5 +1,6 @@
 """Contacts by frame, and motions of a robot that touch the ground in changing places."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -79,3 +80,17 @@ class Motion:
     def __len__(self) -> int:
         """Return the number of instants."""
         return len(self.time)
+
+    def at(self, instants: slice | Sequence[int]) -> "Motion":
+        """Return the motion at some of its instants.
+
+        Args:
+            instants: which, in increasing order.
+        """
+        return Motion(
+            time=self.time[instants],
+            q=self.q[instants],
+            v=self.v[instants],
+            contact_sets=self.contact_sets,
+            contact_index=self.contact_index[instants],
+        )

@@ -21,12 +21,13 @@ potential that is quadratic in θ, and otherwise known to the bound that is stat
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from sealag.kernels.ledger import DISTURBANCE, JOINT_FLOWS, MOTOR_STORE, SCALAR_FLOWS, STORES
 from sealag.simulation._ledger import residual
-from sealag.simulation._store import Store, blocks, release
+from sealag.store import Store, blocks, release
 from sealag.typing import Array
 
 _STILL = 1e-6
@@ -185,15 +186,21 @@ def _trapezoid(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
     return 0.5 * (start[1] + end[1]) * (end[0] - start[0])
 
 
+class Books(NamedTuple):
+    """Energies and works at the logged instants, J."""
+
+    stores: Array  # (N, 4) as in STORES
+    joint: Array  # (N, 9, n) as in JOINT_FLOWS
+    scalar: Array  # (N, 5) as in SCALAR_FLOWS
+    moved: Array  # (N,) sum of the absolute changes of the stores
+
+
 def audit(
     *,
     store: Store,
     time: Array,
     joints: tuple[str, ...],
-    stores: Array,
-    joint: Array,
-    scalar: Array,
-    throughput: Array,
+    books: Books,
     theta_dot: Array,
     shaped_inertia: Array,
     ratio: Array,
@@ -205,15 +212,13 @@ def audit(
         store: Where its arrays lie.
         time: Instants (N,), s.
         joints: Joint names.
-        stores: Energies (N, 4), J.
-        joint: Works per joint (N, 9, n), J.
-        scalar: Other works (N, 5), J.
-        throughput: Energy moved (N,), J.
+        books: What was logged of energies and works.
         theta_dot: Motor speeds (N, n), rad/s.
         shaped_inertia: B_s (n,), kg m².
         ratio: B / B_s (n,).
         stated: What the controller states about itself; None if nothing.
     """
+    stores, joint, scalar, throughput = books
     flows = {name: joint[:, k] for k, name in enumerate(JOINT_FLOWS)}
     command, damping = flows["command"], flows["damping"]
     error, shaping, slack = (store.zeros(len(time)) for _ in range(3))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sealag.simulation._store import blocks, release
+from sealag.store import blocks, release
 from sealag.typing import Array
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)

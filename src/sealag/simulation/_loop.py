@@ -10,7 +10,7 @@ from sealag.actuation import Actuators
 from sealag.errors import InputError, SealagError, SolverError
 from sealag.kernels import keep
 from sealag.robot import Robot
-from sealag.simulation._audit import Stated, UndelayedWork, audit
+from sealag.simulation._audit import Books, Stated, UndelayedWork, audit
 from sealag.simulation._exchange import Exchanges
 from sealag.simulation._interrupt import Interrupt
 from sealag.simulation._memory import events_of, open_channels, open_log
@@ -20,7 +20,7 @@ from sealag.simulation._plant import FASTEST, Plant
 from sealag.simulation._run import Run
 from sealag.simulation._scene import Scene
 from sealag.simulation._start import Start
-from sealag.simulation._store import release
+from sealag.store import release
 from sealag.typing import Array
 from sealag.whole_body import (
     Measurement,
@@ -379,10 +379,7 @@ class _Loop:
                 store=self._store,
                 time=log.time,
                 joints=joints,
-                stores=log.stores,
-                joint=log.joint,
-                scalar=log.scalar,
-                throughput=log.moved,
+                books=Books(log.stores, log.joint, log.scalar, log.moved),
                 theta_dot=log.theta_dot,
                 shaped_inertia=actuators.shaped_inertia,
                 ratio=actuators.rotor_inertia / actuators.shaped_inertia,

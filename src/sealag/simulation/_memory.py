@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sealag.simulation._exchange import Exchanges
 from sealag.simulation._plant import Plant
 from sealag.simulation._scene import Push
-from sealag.simulation._store import Store
+from sealag.store import Store
 from sealag.typing import Array
 
 if TYPE_CHECKING:
@@ -117,7 +117,12 @@ def open_log(plant: Plant, rows: int) -> tuple["Log", Store]:
 
     robot = plant.robot
     shapes = log_shapes(robot.nq, robot.nv, robot.n, points=plant.surroundings.count)
-    store = Store.of(rows, sum(math.prod(shape) for shape in shapes.values()))
+    store = Store.of(
+        rows,
+        sum(math.prod(shape) for shape in shapes.values()),
+        what="The run's log",
+        remedy="log less often (simulation.log_period_ms, --log-ms), simulate for a shorter time",
+    )
     log = allocate_log(rows, shapes, store.zeros)
     log.time[:] = np.nan
     return log, store

@@ -8,7 +8,7 @@ from sealag.simulation._delay_store import delay_store
 from sealag.simulation._exchange import Ages
 from sealag.simulation._outcome import Outcome
 from sealag.simulation._plant import ContactEvent
-from sealag.simulation._store import blocks, release
+from sealag.store import blocks, release
 from sealag.typing import Array, IntArray
 
 

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +73,19 @@ class Spaces:
     def __len__(self) -> int:
         """Return the number of instants."""
         return len(self.J_star)
+
+    def at(self, instants: Sequence[int]) -> "Spaces":
+        """Return the matrices at some of the instants.
+
+        Args:
+            instants: which.
+        """
+        along = {
+            name: getattr(self, name)[list(instants)]
+            for name in self.__dataclass_fields__
+            if name not in ("levels", "K_x")
+        }
+        return replace(self, **along)
 
     def level(self, index: int) -> tuple[Array, Array, Array]:
         """Return J* (N, m_i, n), Λ (N, m_i, m_i) and K_x (m_i, m_i) of a priority level.

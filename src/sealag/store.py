@@ -1,4 +1,4 @@
-"""Where the arrays of a run lie: in memory while they are small, else in the temporary folder."""
+"""Where long arrays lie: in memory while they are small, else in the temporary folder."""
 
 import mmap
 import os
@@ -14,52 +14,52 @@ from sealag.errors import InputError
 from sealag.typing import Array
 
 LARGEST_IN_MEMORY = 64_000_000  # bytes
-_BLOCK = 4096  # rows
+BLOCK = 4096  # rows
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Store:
-    """Allocates the arrays of a run.
+    """Allocates arrays of one length.
 
     An array on disk is the map of a file without a name, which ends with the array. Its room is
     taken at once: a disk that fills up later would crash the process.
 
     Attributes:
         on_disk: Whether arrays are files.
+        remedy: What messages advise where there is no room.
     """
 
     on_disk: bool
+    remedy: str = ""
 
     @classmethod
-    def of(cls, rows: int, numbers: int) -> "Store":
-        """Return the store of a log.
+    def of(cls, rows: int, numbers: int, *, what: str, remedy: str) -> "Store":
+        """Return the store of arrays.
 
         Args:
-            rows: How many instants there will be at most.
-            numbers: How many numbers each has.
+            rows: How many rows they have at most.
+            numbers: How many numbers a row has in all of them.
+            what: What messages call them, such as "The run's log".
+            remedy: What to do where there is no room for them.
 
         Raises:
-            InputError: It would not fit.
+            InputError: They would not fit.
         """
         size = 8 * rows * numbers
         if size <= LARGEST_IN_MEMORY:
             return cls(on_disk=False)
+        need = f"{what} of {rows:.4g} instants needs {size / 1e9:.3g} GB in a temporary folder"
         try:
             folder = tempfile.gettempdir()
             free = shutil.disk_usage(folder).free
         except OSError as error:
-            raise InputError(
-                f"The run would record {rows:.4g} instants in {size / 1e9:.4g} GB, which are kept "
-                f"in a temporary folder, and there is none: {error}. Set TMPDIR."
-            ) from error
+            raise InputError(f"{need}, and there is none: {error}. Set TMPDIR.") from error
         if size > free:
             raise InputError(
-                f"The run would record {rows:.4g} instants in {size / 1e9:.4g} GB, more than the "
-                f"{free / 1e9:.4g} GB that are free in {folder}; log less often "
-                "(simulation.log_period_ms, --log-ms), simulate for a shorter time, or set TMPDIR "
-                "to a folder with more room."
+                f"{need}, but {free / 1e9:.3g} GB are free in {folder}; {remedy}, or set TMPDIR to "
+                "a folder with more room."
             )
-        return cls(on_disk=True)
+        return cls(on_disk=True, remedy=remedy)
 
     def zeros(self, shape: int | tuple[int, ...], dtype: type = float) -> Array:
         """Return an array of zeros, as numpy does.
@@ -83,8 +83,8 @@ class Store:
                 pages = mmap.mmap(file.fileno(), size)
         except OSError as error:
             raise InputError(
-                f"The run's log needs {size / 1e9:.4g} GB more in {tempfile.gettempdir()}: "
-                f"{error.strerror}; make room, log less often, or set TMPDIR."
+                f"{size / 1e9:.3g} GB more are needed in {tempfile.gettempdir()}: "
+                f"{error.strerror}; {self.remedy}, or set TMPDIR to a folder with more room."
             ) from error
         return np.frombuffer(pages, dtype).reshape(shape)
 
@@ -105,12 +105,13 @@ def release(*arrays: Any) -> None:
             base.madvise(mmap.MADV_DONTNEED)
 
 
-def blocks(rows: int, size: int = _BLOCK) -> Iterator[slice]:
+def blocks(rows: int, size: int | None = None) -> Iterator[slice]:
     """Go through rows block by block.
 
     Args:
         rows: How many there are.
-        size: Rows of a block.
+        size: Rows of a block; BLOCK if None.
     """
+    size = BLOCK if size is None else size
     for first in range(0, rows, size):
         yield slice(first, min(first + size, rows))
