@@ -249,7 +249,7 @@ MUTANTS = [
          "an undamped root that leaves at once"),
         ("lower, unstable = delay, unstable + 2 * direction",
          "lower, unstable = delay, unstable + direction", "unstable roots of a range"),
-        ("count += 0 if already else 2 * one.direction", "count += 0",
+        ("count += 2 * one.direction * (passes - already)", "count += 0",
          "roots lost on the way to the embedded delay"),
         ("count, on_axis = roots_at_once(present + loop.A_e)",
          "count, on_axis = roots_at_once(present)", "roots with torque feedback"),
