@@ -21,6 +21,7 @@ def fails(capsys, *arguments):
     assert out == ""
     assert "Traceback" not in err
     assert err.count("\n") == 1, err
+    assert len(err) < 2100
     return err
 
 
@@ -85,6 +86,13 @@ CHANGES = {
         'central_round_trip = {kind = "samples", period_s = 1, file = "no.txt"}',
         ["central_round_trip", "no.txt"]),
     "no motion": ("[delays]", '[motion]\nfile = "no.csv"\n[delays]', ["motion.file", "no.csv"]),
+    "endless integer": ("steps = 7", "steps = " + 5000 * "1", ["a whole number", "19"]),
+    "long integer": ("steps = 7", "steps = " + 400 * "1", ["walking.steps", "at most 19"]),
+    "endless hexadecimal": ("motor_damping = 100.0", "motor_damping = 0x" + 5000 * "f",
+        ["actuators.default.motor_damping", "at most 19"]),
+    "long integer for text": ('kind = "com"', 'kind = 0x' + 5000 * "f", ["tasks", "at most 19"]),
+    "long burst": (SINUSOID, 'central_round_trip = { kind = "constant", value_ms = 1.0, '
+        f"packet_loss = 0.1, max_burst = {2**63 - 1} }}", ["max_burst", "1e+09"]),
     "folder for URDF": ("bundled:hume.urdf", ".", ["robot", "Is a directory"]),
 }  # fmt: skip
 
@@ -113,6 +121,12 @@ def test_huge_and_missing_projects(tmp_path, capsys):
     assert "missing.toml" in fails(capsys, "certify", tmp_path / "missing.toml")
     assert "cannot be read" in fails(capsys, "certify", tmp_path)
     assert "hume" in fails(capsys, "certify", "bundled:humee")
+
+
+def test_project_in_another_encoding_is_named(tmp_path, capsys):
+    path = project(tmp_path)
+    path.write_bytes(b"# first\n# \xe9\n" + path.read_bytes())
+    assert "line 2 is not in UTF-8" in fails(capsys, "certify", path)
 
 
 def test_project_with_byte_order_mark_is_read(tmp_path):
@@ -338,6 +352,9 @@ USAGE = {
     "early": (["simulate", "bundled:hume", "--delay-scale", "-1"], "--delay-scale"),
     "no horizon": (["margin", "bundled:hume", "--horizon-ms", "1e300"], "--horizon-ms"),
     "device": (["verify", "/dev/zero"], "regular"),
+    "endless number": (["simulate", "bundled:hume", "--seed", 5000 * "1"], "--seed"),
+    "endless proofs": (["certify", "bundled:hume", "--proofs", 5000 * "1"], "from 1 up"),
+    "long name": (["certify", "bundled:hume", "--criterion", 10**5 * "x"], "--criterion"),
     "no folder": (["paper", "--out", "/dev/null"], "cannot be made"),
     "no walk": (
         ["paper", str(ROOT / "examples/anymal.toml"), "--out", "page"],

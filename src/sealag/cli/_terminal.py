@@ -9,6 +9,8 @@ from typing import TextIO
 _HIDDEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 """Unicode categories of characters that are not shown but act: control characters, C1 and those
 that turn the direction of writing among them."""
+_LONGEST = 2000
+"""Letters of a message."""
 
 
 def plain(text: str) -> str:
@@ -27,8 +29,11 @@ def show(text: str = "", *, error: bool = False) -> None:
 
     Args:
         text: the line.
-        error: whether it goes to standard error.
+        error: whether it goes to standard error, where the middle of a long one is left out: a
+            message may quote what a file says.
     """
+    if error and len(text) > _LONGEST:
+        text = f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
     print(plain(text), file=sys.stderr if error else sys.stdout, flush=error)
 
 
