@@ -1,4 +1,4 @@
-"""Exit statuses: 0 yes, 1 a decided no, 2 wrong input, 3 the tool failed, 130 interrupted."""
+"""Exit statuses: 0 yes, 1 a decided no, 2 wrong input or output, 3 the tool failed, 130 Ctrl-C."""
 
 import json
 import os
@@ -80,14 +80,20 @@ def test_an_answer_that_nobody_can_read_is_no_yes(tmp_path):
     good = subprocess.run(command, capture_output=True, timeout=300, check=False)
     assert good.returncode == 0
     with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            command, stdout=full, stderr=subprocess.PIPE, timeout=300, check=False
-        )
-    assert done.returncode == 3
-    assert b"No space left" in done.stderr
-    assert b"Traceback" not in done.stderr
+        for words in (command[len(ALONE) :], ["cite"], ["--help"]):
+            done = subprocess.run(
+                [*ALONE, *words], stdout=full, stderr=subprocess.PIPE, timeout=300, check=False
+            )
+            assert done.returncode == 2
+            said = b"sealag: the answer cannot be written: No space left on device.\n"
+            assert done.stderr == said
+        for words, status in (["certify", "none.toml"], 2), (["frobnicate"], 2), (["cite"], 0):
+            done = subprocess.run(
+                [*ALONE, *words], stdout=subprocess.PIPE, stderr=full, timeout=300, check=False
+            )
+            assert done.returncode == status
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=300, check=False)
     os.close(writer)
-    assert (done.returncode, done.stderr) == (3, b"")
+    assert (done.returncode, done.stderr) == (2, b"")

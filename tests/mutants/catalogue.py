@@ -492,8 +492,8 @@ MUTANTS = [
     ),
     *_of(
         "cli", "cli/_app.py",
-        ("raise SystemExit(FAILED if isinstance(error, SolverError) else WRONG_INPUT) from None",
-         "raise SystemExit(WRONG_INPUT) from None", "status of a search that stopped"),
+        ("return FAILED if isinstance(error, SolverError) else WRONG", "return WRONG",
+         "status of a search that stopped"),
         ("if not answered and status in (0, 1):", "if False:", "an answer that nobody reads"),
     ),
     *_of(

@@ -4,6 +4,7 @@ import io
 import os
 import sys
 import unicodedata
+from contextlib import suppress
 from typing import TextIO
 
 _HIDDEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
@@ -34,7 +35,24 @@ def show(text: str = "", *, error: bool = False) -> None:
     """
     if error and len(text) > _LONGEST:
         text = f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
-    print(plain(text), file=sys.stderr if error else sys.stdout, flush=error)
+    if not error:
+        print(plain(text))
+        return
+    with suppress(OSError):  # a full disk: what it was about changes no status
+        print(plain(text), file=sys.stderr, flush=True)
+    write_no_more(sys.stderr)
+
+
+def write_no_more(stream: TextIO) -> None:
+    """Write what a stream holds, or discard it: failing to do so at exit would change the status.
+
+    Args:
+        stream: standard output or standard error.
+    """
+    try:
+        stream.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def open_streams() -> bool:
