@@ -48,7 +48,11 @@ CHANGES = {
     "wrong length": ("stiffness = 100.0", "stiffness = [1.0, 2.0]", ["shape", "3"]),
     "negative gain": ("stiffness = 50.0", "stiffness = -50.0", ["stiffness"]),
     "20-second delay": ("mean_ms = 20.0", "mean_ms = 20000.0", ["mean_ms", "unit"]),
-    "amplitude beyond mean": ("amplitude_ms = 10.0", "amplitude_ms = 30.0", ["amplitude"]),
+    "amplitude beyond mean": ("amplitude_ms = 10.0", "amplitude_ms = 30.3",
+        ["amplitude 30.3 ms", "mean 20 ms"]),
+    "sinusoid too long": ("mean_ms = 20.0, amplitude_ms = 10.0",
+        "mean_ms = 5000, amplitude_ms = 5000",
+        ["largest delay is 10000 ms (10 s), longer than 5000 ms"]),
     "unknown key": ("inertia_shaping = 0.5", "inertia_shapping = 0.5", ["inertia_shapping"]),
     "unknown frame": ('frame = "right_foot"', 'frame = "right_fot"', ["right_fot", "right_foot"]),
     "unknown kind": ('kind = "point"', 'kind = "line"', ["kind", "line"]),
@@ -81,7 +85,10 @@ CHANGES = {
     "com with a frame": ('kind = "com"', 'kind = "com"\nframe = "torso"', ["centre", "frame"]),
     "axis twice": ('kind = "com"', 'kind = "com"\naxes = ["x", "x"]', ["centre of mass", "twice"]),
     "endless burst": (SINUSOID, 'central_round_trip = { kind = "constant", value_ms = 1.0, '
-        "packet_loss = 0.1, max_burst = 1000000000 }\nsample_time_ms = 1.0", ["max_burst", "5 s"]),
+        "packet_loss = 0.1, max_burst = 1000000000 }\nsample_time_ms = 1.0",
+        ["max_burst", "5000 ms"]),
+    "fast drives": (SINUSOID, SINUSOID + "\nsample_time_ms = 1\nembedded_period_ms = 30.3",
+        ["30.3 ms is longer than the central one, 1 ms"]),
     "no samples": (SINUSOID,
         'central_round_trip = {kind = "samples", period_s = 1, file = "no.txt"}',
         ["central_round_trip", "no.txt"]),
@@ -138,7 +145,8 @@ def test_project_with_byte_order_mark_is_read(tmp_path):
 SAMPLES = {
     "empty": ("\n", "empty"),
     "two columns": ("8.0\n0.1 8.0\n", "line 2"),
-    "seconds or worse": ("1e4\n", "5 s"),
+    "seconds or worse": ("1e4\n", "10000 ms"),
+    "negative": ("-3.3\n", "-3.3 ms"),
 }
 
 

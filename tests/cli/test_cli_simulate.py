@@ -166,6 +166,7 @@ def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, cli, monkeypatch)
         (["--duration", "nan"], "duration"),
         (["--delay-scale", "-1"], "--delay-scale"),
         (["--out", ""], "--out"),
+        (["--log-ms", "20.3"], "the log period of 20.3 ms"),
     ],
 )
 def test_bad_scenarios_are_named(arguments, word, tmp_path, cli):

@@ -56,7 +56,9 @@ def test_numbers_of_other_kinds_are_taken() -> None:
 
 def test_a_horizon_with_endless_crossings_names_one_that_is_short_enough() -> None:
     """A root crosses every 2π s: the list of 1e12 s would need terabytes."""
-    with pytest.raises(InputError, match=r"horizon is 1e\+12 s.* at most 10,000 are listed") as no:
+    with pytest.raises(
+        InputError, match=r"horizon is 1e\+15 ms \(1e\+12 s\).* at most 10,000 are listed"
+    ) as no:
         delay_margin([[0.0]], [[-1.0]], horizon=1e12)
     short = re.search(r"ask for (\S+) s \(--horizon-ms (\S+)\)", str(no.value))
     assert short is not None

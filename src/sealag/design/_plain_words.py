@@ -55,7 +55,7 @@ def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> s
     if isinstance(found, str) and found.startswith("FILL"):
         return f"{path}: {key} is still to be filled in ({found}).{rest}"
     shown = repr(found) if len(repr(found)) < 60 else f"a {type(found).__name__}"
-    unit = " (a delay in ms: was another unit meant?)" if key.endswith("_ms") else ""
+    unit = " (in ms: was another unit meant?)" if key.endswith("_ms") else ""
     return f"{path}: {key} is {shown}; {need}{unit}.{rest}"
 
 

@@ -21,6 +21,7 @@ from sealag.margin._pictures import Picture, Turn, frequency_of
 from sealag.margin._roots import loop_roots
 from sealag.margin._search import search
 from sealag.typing import Array, ArrayLike
+from sealag.units import in_ms
 
 _RESIDUAL = 1e-9
 _AT = 1e-9
@@ -330,8 +331,9 @@ def _check_count(moving: Sequence[Crossing], end: float) -> None:
     step = 10.0 ** math.floor(math.log10(short))
     short = math.floor(short / step) * step
     raise InputError(
-        f"horizon is {end:g} s, before which roots cross the axis {rate * end:.1g} times; at most "
-        f"{_MOST_LISTED:,} are listed: ask for {short:g} s (--horizon-ms {short * 1e3:g})."
+        f"horizon is {in_ms(end)} ({end:g} s), before which roots cross the axis "
+        f"{rate * end:.1g} times; at most {_MOST_LISTED:,} are listed: ask for {short:g} s "
+        f"(--horizon-ms {short * 1e3:g})."
     )
 
 
