@@ -136,6 +136,10 @@ def test_a_fall_is_a_named_result(tmp_path, cli):
     assert code == 0
     assert answer["outcome"] == "fell"
     assert "tilted" in answer["message"]
+    arguments = ("--scenario", "regulate", "--out", tmp_path / "r.mcap")
+    code, text, _ = cli("simulate", "bundled:hume", *arguments)
+    assert code == 0
+    assert text.splitlines()[0] == f"{'outcome':26} fell: {answer['message']}"
     assert read_recording(tmp_path / "r.mcap").complete
 
 

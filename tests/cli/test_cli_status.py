@@ -71,6 +71,10 @@ def test_yes_and_no_are_the_controls(tmp_path, cli):
     out.write_text(json.dumps({**data, "delay_s": 10.0}))
     assert cli("verify", out)[0] == 1
     assert cli("certify", "bundled:hume", "--out", out)[0] == 1
+    code, text, _ = cli("verify", out)
+    assert code == 0
+    assert text.endswith("the certificate holds: as it states, the design is not certified\n")
+    assert json.loads(cli("verify", out, "--json")[1])["status"] == "not_certified"
     assert cli("certify", tmp_path / "none.toml", "--out", out)[0] == 2
 
 

@@ -230,7 +230,9 @@ def verify_certificate(
         for check in result.checks:
             if not check.ok:
                 show(f"BAD  {check.name}: {check.detail}")
-        show("the certificate holds" if result.valid else "the certificate does not hold")
+        certified = result.status is Status.CERTIFIED
+        stated = "" if certified else ": as it states, the design is not certified"
+        show(f"the certificate holds{stated}" if result.valid else "the certificate does not hold")
     return 0 if result.valid else 1
 
 

@@ -142,7 +142,7 @@ def gait_summary(system: System, run: Run) -> dict[str, Any]:
 
 def _show(run: Run, answer: dict[str, Any]) -> None:
     books = run.audit
-    show(f"{'outcome':26} {answer['outcome']} {answer['message']}".rstrip())
+    show(f"{'outcome':26} {answer['outcome']}: {answer['message']}".rstrip(": "))
     show(f"{'simulated':26} {answer['duration_s']:.3f} s")
     show(f"{'measurement at most':26} {answer['measurement_age_s'] * 1e3:.2f} ms old")
     show(f"{'command at most':26} {answer['command_age_s'] * 1e3:.2f} ms old")
