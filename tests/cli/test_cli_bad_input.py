@@ -55,6 +55,9 @@ CHANGES = {
         ["largest delay is 10000 ms (10 s), longer than 5000 ms"]),
     "unknown key": ("inertia_shaping = 0.5", "inertia_shapping = 0.5", ["inertia_shapping"]),
     "unknown frame": ('frame = "right_foot"', 'frame = "right_fot"', ["right_fot", "right_foot"]),
+    "push on no frame": ("[delays]", '[[simulation.pushes]]\nframe = "torsoo"\n'
+        "force_n = [1.0, 0.0, 0.0]\nstart_s = 0.0\nduration_s = 0.1\n[delays]",
+        ["simulation.pushes", "'torsoo'", "torso"]),
     "unknown kind": ('kind = "point"', 'kind = "line"', ["kind", "line"]),
     "unknown feedback": ('feedback = "motor"', 'feedback = "engine"', ["feedback", "engine"]),
     "missing section": ("[robot]", "[robott]", ["robot"]),

@@ -92,6 +92,13 @@ def test_the_bundled_walk_is_the_default_one():
     assert set(section["options"]) == {field.name for field in fields(WalkingOptions)}
 
 
+def test_a_side_that_is_not_judged_says_why(tmp_path, cli):
+    arguments = (EXAMPLES / "baxter.toml", "--duration", "0.01", "--out", tmp_path / "r.mcap")
+    said = f"{'controller side':26} not judged: the reference moves\n"
+    assert said in cli("simulate", *arguments, "--scenario", "track")[1]
+    assert "not judged" not in cli("simulate", *arguments, "--scenario", "regulate")[1]
+
+
 def test_same_seed_same_run(tmp_path, cli):
     text = (EXAMPLES / "baxter.toml").read_text()
     path = tmp_path / "noisy.toml"

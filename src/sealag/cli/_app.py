@@ -67,15 +67,29 @@ def _options(
 
 @app.command()
 def init(
-    urdf: Annotated[str, typer.Argument(help="The robot's URDF.")],
+    urdf: Annotated[
+        str,
+        typer.Argument(
+            help="The robot's URDF: a path, bundled:hume.urdf, or example-robot-data:PATH of that "
+            "package."
+        ),
+    ],
     out: Annotated[
-        Path | None, typer.Option("--out", help="Project file to write. Default: ROBOT.toml.")
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Project file to write; its folder is made if needed. Default: ROBOT.toml.",
+        ),
     ] = None,
     floating: Annotated[
         bool, typer.Option("--floating/--fixed", help="Whether the base floats.")
     ] = True,
 ) -> None:
-    """Write a commented project file with the robot's own joints in it."""
+    """Write a commented project file with the robot's own joints in it.
+
+    The posture is a group state of an SRDF in the URDF's folder, or in a folder srdf there or
+    beside it, whose name begins with standing, half_sitting, homing, home, default or neutral.
+    """
     from sealag.cli._commands import init_project
 
     path = init_project(urdf, out, floating_base=floating)
@@ -92,7 +106,11 @@ def certify(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Certificate to write. Default: PROJECT.certificate.json."),
+        typer.Option(
+            "--out",
+            help="Certificate to write; its folder is made if needed. Default: "
+            "PROJECT.certificate.json.",
+        ),
     ] = None,
     time_varying: Annotated[
         bool,
@@ -213,7 +231,11 @@ def simulate(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Recording to write. Default: PROJECT.mcap.")
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Recording to write; its folder is made if needed. Default: PROJECT.mcap.",
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -237,9 +259,9 @@ def paper(
     project: Annotated[
         str, typer.Argument(help="Project file of Hume with a [walking] section.")
     ] = "bundled:hume",
-    out: Annotated[Path, typer.Option("--out", help="Folder for page and CSVs.")] = Path(
-        "out/paper"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder for page and CSVs; it is made if needed.")
+    ] = Path("out/paper"),
     quick: Annotated[
         bool, typer.Option("--quick", help="Only a few cases of each table, in minutes.")
     ] = False,

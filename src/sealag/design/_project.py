@@ -155,6 +155,9 @@ def _system(project: Any, path: Path, text: str) -> System:
         task_error=project.controller.task_error,
     )
     law.gain(robot)
+    with _named(path, "simulation.pushes"):
+        for push in project.simulation.pushes:
+            robot.check_frame(push.frame)
     motion_file = folder / project.motion.file if project.motion else None
     if motion_file and not motion_file.is_file():
         raise FileError(f"{path}: motion.file is {project.motion.file!r}; there is no such file.")
