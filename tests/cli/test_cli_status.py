@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -18,7 +19,7 @@ from sealag.errors import (
 )
 
 HELD = str(EXAMPLES / "hume_held.toml")
-ALONE = (sys.executable, "-c", "from sealag.cli import main; main()")
+ALONE = (sys.executable, "-m", "sealag")
 
 COMMANDS = {
     "init": (["init", "robot.urdf"], "sealag.design.starter_project"),
@@ -76,6 +77,30 @@ def test_yes_and_no_are_the_controls(tmp_path, cli):
     assert text.endswith("the certificate holds: as it states, the design is not certified\n")
     assert json.loads(cli("verify", out, "--json")[1])["status"] == "not_certified"
     assert cli("certify", tmp_path / "none.toml", "--out", out)[0] == 2
+
+
+EARLY = """
+import runpy
+import sys
+
+class Stop:
+    def find_spec(self, name, path=None, target=None):
+        if name == "sealag.cli":
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Stop())
+runpy.run_module("sealag", run_name="__main__")
+"""
+
+
+def test_ctrl_c_while_the_command_line_loads_is_told():
+    done = subprocess.run(
+        [sys.executable, "-c", EARLY, "cite"], capture_output=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (130, b"")
+    assert done.stderr == b"sealag: interrupted\n"
+    scripts = tomllib.loads((EXAMPLES.parent / "pyproject.toml").read_text())["project"]["scripts"]
+    assert scripts == {"sealag": "sealag.__main__:main"}
 
 
 def test_an_answer_that_nobody_can_read_is_no_yes(tmp_path):
