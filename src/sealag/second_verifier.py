@@ -48,7 +48,7 @@ def read(path: str) -> dict[str, Any]:
         data = json.loads(text, object_pairs_hook=_once, parse_constant=number,
                           parse_float=_figure, parse_int=_figure)
     except (OSError, ValueError, RecursionError) as error:
-        raise WrongInputError(str(error)) from error
+        raise WrongInputError(getattr(error, "strerror", None) or str(error)) from error
     odd = set(data if isinstance(data, dict) else {}) ^ set(KEYS.split())
     if odd or data["schema"] != "sealag-certificate/4":
         raise WrongInputError(f"it is not sealag-certificate/4, or has odd keys {sorted(odd)[:5]}")
