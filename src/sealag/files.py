@@ -86,7 +86,7 @@ def check_output(path: Path, *inputs: Path) -> None:
         FileError: it is one of the inputs, exists and is not a regular file, or cannot be a file.
     """
     with _told(path):
-        target = Path(os.path.realpath(path))  # where a draft goes, `..` and links followed
+        target = _target(path)
         if target.exists() and not target.is_file():
             raise FileError(
                 f"{path} is not a regular file and is not overwritten; choose another --out."
@@ -142,6 +142,18 @@ def make_folder(path: Path) -> None:
         raise FileError(f"The folder {path} cannot be made: {error.strerror or error}.") from error
 
 
+def _target(path: Path) -> Path:
+    """Where a draft goes, `..` and links followed.
+
+    Raises:
+        FileError: a link leads back to itself.
+    """
+    target = Path(os.path.realpath(path))
+    if any(one.is_symlink() for one in (target, *target.parents)):
+        raise FileError(f"{path} is a link that leads back to itself; choose another --out.")
+    return target
+
+
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
     """Let what goes wrong say which file cannot be written; a FileError says so itself."""
@@ -178,7 +190,7 @@ class Draft:
     def __init__(self, path: Path, *, patience: float = 0.0) -> None:
         self.asked = path
         with _told(path):
-            self.path = Path(os.path.realpath(path))
+            self.path = _target(path)
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._name = _draft_of(self.path)
             last = time.monotonic() + patience
@@ -224,6 +236,7 @@ class Draft:
         """
         with _told(self.asked):
             os.fsync(self.file.fileno())
+            self._require_mine()
             if replace:
                 if self.path.is_file():
                     os.fchmod(self.file.fileno(), stat.S_IMODE(self.path.stat().st_mode))
@@ -249,7 +262,8 @@ class Draft:
         target = self.asked
         while True:
             with _told(target):
-                if _named_new(self._name, Path(os.path.realpath(target))):
+                self._require_mine()
+                if _named_new(self._name, _target(target)):
                     break
             target = self.asked.with_suffix(next(others))
         self.drop()
@@ -259,9 +273,21 @@ class Draft:
         """Leave nothing of the draft: of one that is kept, its hidden name is gone already."""
         if not self.file.closed:
             with suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(self.file.fileno()), os.lstat(self._name)):
+                if self._is_mine():
                     os.unlink(self._name)
             self.file.close()
+
+    def _is_mine(self) -> bool:
+        """Whether the hidden name is still this draft's."""
+        return os.path.samestat(os.fstat(self.file.fileno()), os.lstat(self._name))
+
+    def _require_mine(self) -> None:
+        """Refuse to name another file that somebody has put in the draft's place."""
+        if not self._is_mine():
+            raise FileError(
+                f"{self.asked} cannot be written: somebody has replaced its unfinished file "
+                f"{self._name}; leave that alone and try again."
+            )
 
 
 def _draft_of(path: Path) -> Path:
@@ -275,6 +301,9 @@ def _draft_of(path: Path) -> Path:
 def _claimed(name: str, _flags: int) -> int:
     """Open a draft, locked and empty.
 
+    One with another name too, as a writer leaves it that is killed while it gives the name, is a
+    whole file: it loses the draft's name and keeps what it holds.
+
     Raises:
         BlockingIOError: its writer lives.
     """
@@ -284,9 +313,11 @@ def _claimed(name: str, _flags: int) -> int:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             with suppress(FileNotFoundError):
                 # Meanwhile its writer may have renamed it, and the name is of another file.
-                if os.path.samestat(os.fstat(handle), os.lstat(name)):
-                    os.ftruncate(handle, 0)
-                    return handle
+                if os.path.samestat(status := os.fstat(handle), os.lstat(name)):
+                    if status.st_nlink == 1:
+                        os.ftruncate(handle, 0)
+                        return handle
+                    os.unlink(name)
         except BaseException:
             os.close(handle)
             raise

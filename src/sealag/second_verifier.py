@@ -21,7 +21,7 @@ from fractions import Fraction
 from itertools import pairwise, product
 from typing import Any
 
-__all__ = ["claims", "main", "read"]
+__all__ = ["claims", "decided", "main", "read"]
 
 Matrix = list[list[Any]]
 Claim = tuple[str, bool | None, str]  # what; whether it holds, None if undecided; detail
@@ -45,19 +45,22 @@ def read(path: str) -> dict[str, Any]:
     try:
         with open(path, "rb") as file:
             text = file.read(LARGEST_FILE)  # what is cut off there is no JSON
-        data = json.loads(text, object_pairs_hook=_once, parse_constant=number)
-    except (OSError, ValueError, RecursionError) as error:  # Python reads no 5,000 digits
-        raise WrongInputError(f"{path}: {error}") from error
+        data = json.loads(text, object_pairs_hook=_once, parse_constant=number,
+                          parse_float=_figure, parse_int=_figure)
+    except (OSError, ValueError, RecursionError) as error:
+        raise WrongInputError(getattr(error, "strerror", None) or str(error)) from error
     odd = set(data if isinstance(data, dict) else {}) ^ set(KEYS.split())
     if odd or data["schema"] != "sealag-certificate/4":
-        raise WrongInputError(f"{path}: not sealag-certificate/4, or odd keys {sorted(odd)[:5]}")
+        raise WrongInputError(f"it is not sealag-certificate/4, or has odd keys {sorted(odd)[:5]}")
     return data
-
+def _figure(text: str) -> int | float:
+    if not math.isfinite(value := float(text)):
+        raise WrongInputError(f"{text[:40]!r} is no finite number")
+    return value if set(text) & set(".eE") else int(text)
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(dict(pairs)) < len(pairs):
         raise WrongInputError(f"a key stands twice among {[key for key, _ in pairs][:20]}")
     return dict(pairs)
-
 def number(value: Any) -> Fraction:
     """Return a finite number as the rational that it is; `value` comes from the file."""
     if type(value) not in (int, float) or not math.isfinite(value):
@@ -127,7 +130,6 @@ def proof_claims(c: dict[str, Any], p: dict[str, Any], D: list[Fraction]) -> Ite
     close = square(combine(d, multiplier, -1, wide)) <= AGREE**2 * square(wide)
     yield f"{name}: W = d Q, symmetric", close and turned(wide) == wide, ""
     yield f"{name}: [[2D - loss, dM], [dMᵀ, W]] > 0", dissipates(2, D, loss, d, M, wide), ""
-
 def spread(blocks: list[Matrix]) -> Matrix:
     """The matrix with these blocks on its diagonal."""
     n, rows, first = sum(map(len, blocks)), [], 0
@@ -136,7 +138,6 @@ def spread(blocks: list[Matrix]) -> Matrix:
         rows += [[Fraction(0)] * first + row + [Fraction(0)] * after for row in one]
         first += len(one)
     return rows
-
 def dissipates(factor: Any, D: list[Fraction], loss: Matrix, d: Any, M: Matrix, W: Matrix) -> bool:
     """Whether [[factor D − loss, d M], [d Mᵀ, W]] is positive definite."""
     corner, side = combine(factor, diagonal(D), -1, loss), combine(d, M, 0, M)
@@ -187,9 +188,7 @@ def shared_claims(c: dict[str, Any], D: list[Fraction]) -> Iterator[Claim]:
                  if w["first"] <= p["instant"] <= w["last"])
     yield "windows hold the proven instants", inside, ""
     yield "windows hold the motion elsewhere", None, "its matrices are not in the file"
-
 ROOT_2 = Fraction(math.isqrt(2 << 400), 1 << 200)  # from below
-
 def _window(w: dict[str, Any], D: list[Fraction], d: Any, W: Matrix) -> bool:
     """(√2 − r)² in place of 2 at each vertex covers the ball of radius r around it."""
     n, r = len(D), number(w["radius"])
@@ -199,7 +198,6 @@ def _window(w: dict[str, Any], D: list[Fraction], d: Any, W: Matrix) -> bool:
         corners = [combine(1, corner, sign, axis) for corner in corners for sign in (-1, 1)]
     factor = (ROOT_2 - r) ** 2
     return 0 <= r < 1 and all(dissipates(factor, D, W, d, F, W) for F in corners)
-
 def _inside(w: dict[str, Any], F: Matrix, D: list[Fraction], d: Any, W: Matrix) -> bool:
     """‖d D^-½ Δ W^-½‖ ≤ r says [[r² D, dΔ], [dΔᵀ, W]] ⪰ 0; Δ is F less a point of the box."""
     n, rest = len(D), combine(1, F, -1, matrix(w["centre"], len(D), len(D)))
@@ -256,7 +254,6 @@ def loop_claims(c: dict[str, Any]) -> Iterator[Claim]:
         yield name, True if found == modes else _near(A, modes), words
     words = "it is a root of a transcendental function; the first verifier excludes shorter delays"
     yield "first crossing and local margin", None, words
-
 def _quotient(A: Matrix, A_1: Matrix, V: Matrix, states: list[str]) -> Matrix:
     """A without symmetries v (A v = 0) and rates along them that last (A w = v, A_1 w = 0).
 
@@ -274,14 +271,12 @@ def _quotient(A: Matrix, A_1: Matrix, V: Matrix, states: list[str]) -> Matrix:
         A = [[A[i][k] - ratio[i] * A[p][k] for k in rest] for i in rest]
         columns = [[w[i] - ratio[i] * w[p] for i in rest] for w in columns]
     return A
-
 def _near(A: Matrix, modes: int) -> bool | None:
     """False unless roots so near the axis that rounding moves them over it make the difference."""
     size = max(abs(x) for row in A for x in row) * Fraction(1, 10**12)
     shifted = [combine(1, A, sign, diagonal([size] * len(A))) for sign in (-1, 1)]
     low, high = (unstable(polynomial(whole(one))) for one in shifted)
     return None if low is None or high is None or low <= modes <= high else False
-
 def polynomial(A: list[list[int]]) -> list[int]:
     """Coefficients of det(s − A), highest first, without any division (Berkowitz)."""
     result = [1]
@@ -296,7 +291,6 @@ def polynomial(A: list[list[int]]) -> list[int]:
 
 DOWN, UP = (Context(DIGITS, way, -(10**9), 10**9) for way in (ROUND_FLOOR, ROUND_CEILING))
 Interval = tuple[Decimal, Decimal]
-
 def unstable(p: list[int]) -> int | None:
     """Roots with Re > 0: changes of sign down Routh's table of intervals; None if one holds 0."""
     rows = [[(DOWN.create_decimal(x), UP.create_decimal(x)) for x in p[k::2]] for k in (0, 1)]
@@ -310,7 +304,6 @@ def unstable(p: list[int]) -> int | None:
         low = [_outward("multiply", q, y) for y in below[1:]] + [zero] * len(above)
         rows = [below, [_outward("subtract", x, y) for x, y in zip(above[1:], low)]]
     return sum(x != y for x, y in pairwise(heads))
-
 def _outward(way: str, x: Interval, y: Interval) -> Interval:
     """All that multiply, divide or subtract makes of two intervals."""
     pairs = list(product(x, y))
@@ -349,7 +342,6 @@ def motion_claims(c: dict[str, Any], D: list[Fraction]) -> Iterator[Claim]:
     ratio = float(smallest or 0) / float(largest) if both else None
     yield "conservatism", c["conservatism"] == ratio, f"{ratio}"
     yield _verdict(c, largest)
-
 def _verdict(c: dict[str, Any], largest: Any) -> Claim:
     """Certified if and only if every bound covers the delay and no margin undercuts the bound."""
     d, no = number(c["delay_s"]), bool(c["reasons"])
@@ -382,17 +374,25 @@ def claims(c: dict[str, Any]) -> Iterator[Claim]:
     yield upper_claim(c, D)
     yield from loop_claims(c)
 
+def decided(path: str) -> list[Claim]:
+    """Decide every claim of the file at `path`, or say in words why it is no certificate."""
+    try:
+        return list(claims(read(path)))
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        kinds = {WrongInputError: "", KeyError: "a key is missing: "}
+        kind = kinds.get(type(error), "an entry is of another type or size: ")
+        raise WrongInputError(f"{kind}{error}") from error
 def main(path: str, show: Callable[[str], Any] = print) -> int:
     """Print one line for each claim of the file at `path` through `show`; return the status."""
-    words, counts = {True: "holds", False: "does not hold", None: "cannot decide"}, [0, 0, 0]
+    words = {True: "holds", False: "does not hold", None: "cannot decide"}
     try:
-        for claim, holds, detail in claims(read(path)):
-            counts[(True, False, None).index(holds)] += 1
-            line = f"{words[holds]:14} {claim}{': ' if detail else ''}{detail}"
-            show("".join(filter(str.isprintable, line)))
-    except (ArithmeticError, AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
-        show(f"no certificate: {type(error).__name__}: {ascii(str(error))[:200]}")
+        found = decided(path)
+    except WrongInputError as error:
+        show(f"no certificate: {ascii(str(error))[:200]}")
         return 2
+    for claim, holds, detail in found:
+        show("".join(filter(str.isprintable, f"{words[holds]:14} {claim}: {detail}".rstrip(": "))))
+    counts = [sum(holds is one for _, holds, _ in found) for one in words]
     show(f"{counts[0]} claims hold, {counts[1]} do not, {counts[2]} cannot be decided here")
     return 1 if counts[1] else 0
 

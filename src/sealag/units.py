@@ -47,6 +47,15 @@ def time_text(value_s: float | None) -> str:
     return f"{digits} {unit}"
 
 
+def in_ms(value_s: float) -> str:
+    """Write a time in ms, as project files and options give it, with the digits that they have.
+
+    Args:
+        value_s: s.
+    """
+    return f"{value_s * 1e3:.9g} ms"
+
+
 def number_of(text: str) -> float | None:
     """Return the number that a cell of a text file holds; None if it holds none.
 
@@ -80,11 +89,11 @@ def check_delay_s(value_s: float, name: str) -> float:
     if not isinstance(value_s, Real) or isinstance(value_s, bool):
         raise InputError(f"{name} is {value_s!r}; it must be a number of seconds.")
     if not math.isfinite(value_s) or value_s < 0.0:
-        raise InputError(f"{name} is {value_s} s; it must be finite and not negative.")
+        raise InputError(f"{name} is {in_ms(value_s)}; it must be finite and not negative.")
     if value_s > LONGEST_DELAY_S:
         raise InputError(
-            f"{name} is {value_s:g} s, longer than {LONGEST_DELAY_S:g} s; "
-            f"was {value_s:g} ms meant? Then write {value_s * 1e-3:g} s."
+            f"{name} is {in_ms(value_s)} ({value_s:g} s), longer than {in_ms(LONGEST_DELAY_S)}; "
+            "was another unit meant?"
         )
     return value_s
 
@@ -92,6 +101,7 @@ def check_delay_s(value_s: float, name: str) -> float:
 __all__ = [
     "LONGEST_DELAY_S",
     "check_delay_s",
+    "in_ms",
     "number_of",
     "seconds_from_ms",
     "time_text",

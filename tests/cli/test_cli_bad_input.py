@@ -21,6 +21,7 @@ def fails(capsys, *arguments):
     assert out == ""
     assert "Traceback" not in err
     assert err.count("\n") == 1, err
+    assert len(err) < 2100
     return err
 
 
@@ -47,9 +48,16 @@ CHANGES = {
     "wrong length": ("stiffness = 100.0", "stiffness = [1.0, 2.0]", ["shape", "3"]),
     "negative gain": ("stiffness = 50.0", "stiffness = -50.0", ["stiffness"]),
     "20-second delay": ("mean_ms = 20.0", "mean_ms = 20000.0", ["mean_ms", "unit"]),
-    "amplitude beyond mean": ("amplitude_ms = 10.0", "amplitude_ms = 30.0", ["amplitude"]),
+    "amplitude beyond mean": ("amplitude_ms = 10.0", "amplitude_ms = 30.3",
+        ["amplitude 30.3 ms", "mean 20 ms"]),
+    "sinusoid too long": ("mean_ms = 20.0, amplitude_ms = 10.0",
+        "mean_ms = 5000, amplitude_ms = 5000",
+        ["largest delay is 10000 ms (10 s), longer than 5000 ms"]),
     "unknown key": ("inertia_shaping = 0.5", "inertia_shapping = 0.5", ["inertia_shapping"]),
     "unknown frame": ('frame = "right_foot"', 'frame = "right_fot"', ["right_fot", "right_foot"]),
+    "push on no frame": ("[delays]", '[[simulation.pushes]]\nframe = "torsoo"\n'
+        "force_n = [1.0, 0.0, 0.0]\nstart_s = 0.0\nduration_s = 0.1\n[delays]",
+        ["simulation.pushes", "'torsoo'", "torso"]),
     "unknown kind": ('kind = "point"', 'kind = "line"', ["kind", "line"]),
     "unknown feedback": ('feedback = "motor"', 'feedback = "engine"', ["feedback", "engine"]),
     "missing section": ("[robot]", "[robott]", ["robot"]),
@@ -57,8 +65,14 @@ CHANGES = {
     "not TOML": ("[robot]", "[robot", ["TOML"]),
     "unknown gait key": ("apex_speed = 0.5", "apexspeed = 0.5", ["apexspeed", "apex_speed"]),
     "impossible gait": ("transfer_time = 0.06", "transfer_time = 0.34", ["60 %"]),
-    "unknown means": ('prediction = "model"', 'prediction = "magic"', ["prediction", "magic"]),
-    "text for a means": ("task_damping = 0.5", 'task_damping = "much"', ["task_damping", "much"]),
+    "unknown means": ('prediction = "model"', 'prediction = "magic"',
+        ["walking.options.prediction", "magic", "none, velocity or model"]),
+    "text for a means": ("task_damping = 0.5", 'task_damping = "much"',
+        ["walking.options.task_damping", "much", "0 … 1000"]),
+    "number for a means": ("lead = true", "lead = 1", ["walking.options.lead", "true or false"]),
+    "true for a gain": ("task_damping = 0.5", "task_damping = true",
+        ["walking.options.task_damping"]),
+    "hurry": ("apex_speed = 0.5", "apex_speed = 50", ["walking.gait.apex_speed", "20 m/s"]),
     "one foot": ('feet = ["left_foot", "right_foot"]', 'feet = ["left_foot"]', ["feet"]),
     "unknown terrain": ('kind = "paper"', 'kind = "moon"', ["terrain", "moon"]),
     "text for number": ("rotor_inertia = 0.093", 'rotor_inertia = "heavy"', ["rotor_inertia"]),
@@ -80,11 +94,21 @@ CHANGES = {
     "com with a frame": ('kind = "com"', 'kind = "com"\nframe = "torso"', ["centre", "frame"]),
     "axis twice": ('kind = "com"', 'kind = "com"\naxes = ["x", "x"]', ["centre of mass", "twice"]),
     "endless burst": (SINUSOID, 'central_round_trip = { kind = "constant", value_ms = 1.0, '
-        "packet_loss = 0.1, max_burst = 1000000000 }\nsample_time_ms = 1.0", ["max_burst", "5 s"]),
+        "packet_loss = 0.1, max_burst = 1000000000 }\nsample_time_ms = 1.0",
+        ["max_burst", "5000 ms"]),
+    "fast drives": (SINUSOID, SINUSOID + "\nsample_time_ms = 1\nembedded_period_ms = 30.3",
+        ["30.3 ms is longer than the central one, 1 ms"]),
     "no samples": (SINUSOID,
         'central_round_trip = {kind = "samples", period_s = 1, file = "no.txt"}',
         ["central_round_trip", "no.txt"]),
     "no motion": ("[delays]", '[motion]\nfile = "no.csv"\n[delays]', ["motion.file", "no.csv"]),
+    "endless integer": ("steps = 7", "steps = " + 5000 * "1", ["a whole number", "19"]),
+    "long integer": ("steps = 7", "steps = " + 400 * "1", ["walking.steps", "at most 19"]),
+    "endless hexadecimal": ("motor_damping = 100.0", "motor_damping = 0x" + 5000 * "f",
+        ["actuators.default.motor_damping", "at most 19"]),
+    "long integer for text": ('kind = "com"', 'kind = 0x' + 5000 * "f", ["tasks", "at most 19"]),
+    "long burst": (SINUSOID, 'central_round_trip = { kind = "constant", value_ms = 1.0, '
+        f"packet_loss = 0.1, max_burst = {2**63 - 1} }}", ["max_burst", "1e+09"]),
     "folder for URDF": ("bundled:hume.urdf", ".", ["robot", "Is a directory"]),
 }  # fmt: skip
 
@@ -115,6 +139,12 @@ def test_huge_and_missing_projects(tmp_path, capsys):
     assert "hume" in fails(capsys, "certify", "bundled:humee")
 
 
+def test_project_in_another_encoding_is_named(tmp_path, capsys):
+    path = project(tmp_path)
+    path.write_bytes(b"# first\n# \xe9\n" + path.read_bytes())
+    assert "line 2 is not in UTF-8" in fails(capsys, "certify", path)
+
+
 def test_project_with_byte_order_mark_is_read(tmp_path):
     path = project(tmp_path)
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
@@ -124,7 +154,8 @@ def test_project_with_byte_order_mark_is_read(tmp_path):
 SAMPLES = {
     "empty": ("\n", "empty"),
     "two columns": ("8.0\n0.1 8.0\n", "line 2"),
-    "seconds or worse": ("1e4\n", "5 s"),
+    "seconds or worse": ("1e4\n", "10000 ms"),
+    "negative": ("-3.3\n", "-3.3 ms"),
 }
 
 
@@ -338,6 +369,9 @@ USAGE = {
     "early": (["simulate", "bundled:hume", "--delay-scale", "-1"], "--delay-scale"),
     "no horizon": (["margin", "bundled:hume", "--horizon-ms", "1e300"], "--horizon-ms"),
     "device": (["verify", "/dev/zero"], "regular"),
+    "endless number": (["simulate", "bundled:hume", "--seed", 5000 * "1"], "--seed"),
+    "endless proofs": (["certify", "bundled:hume", "--proofs", 5000 * "1"], "from 1 up"),
+    "long name": (["certify", "bundled:hume", "--criterion", 10**5 * "x"], "--criterion"),
     "no folder": (["paper", "--out", "/dev/null"], "cannot be made"),
     "no walk": (
         ["paper", str(ROOT / "examples/anymal.toml"), "--out", "page"],

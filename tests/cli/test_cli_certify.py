@@ -160,7 +160,11 @@ def test_starter_file_answers_once_filled(base, tmp_path, cli):
     assert code == 0
     code, _, err = cli("certify", path)
     assert code == 2
-    assert "still to be filled in" in err
+    _, _, named = err.partition("still to be filled in: ")
+    lines = [line.split(" = ")[0] for line in path.read_text().splitlines() if '"FILL' in line]
+    assert len(lines) >= 6
+    for line in lines:
+        assert line in named
     text = path.read_text().replace('"FILL: rad"', "0.1")
     for fill, value in (
         ("FILL: K,", "350.0"), ("FILL: beta", "0.5"), ("FILL: D_theta", "50.0"),
@@ -181,6 +185,19 @@ def test_starter_file_answers_once_filled(base, tmp_path, cli):
     code, _, err = cli("init", resolve_urdf("bundled:hume.urdf"), "--out", path)
     assert code == 2
     assert "exists already" in err
+
+
+def test_the_starter_s_units_and_names_are_told(tmp_path, cli):
+    """Of a stiffness that multiplies no inertia, a jitter on two ways, postures and folders."""
+    help_text = " ".join(cli("init", "--help")[1].split())
+    for name in ("standing, half_sitting, homing, home, default or neutral", "bundled:hume.urdf",
+                 "--fixed", "folder is made if needed"):  # fmt: skip
+        assert name in help_text
+    path = tmp_path / "new" / "p.toml"
+    assert cli("init", "bundled:hume.urdf", "--out", path)[0] == 0
+    text = path.read_text()
+    assert "Nm/rad if stiffness_form is force" in text
+    assert "jitter counts on the way up and on the way down" in " ".join(text.split("\n# "))
 
 
 def test_help_and_version(cli):

@@ -1,6 +1,7 @@
 """`sealag margin`: the exact margin, and stable and unstable delays beyond it."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from helpers.designs import EXAMPLES
 from sealag.margin import rightmost_roots
 
 BAXTER = EXAMPLES / "baxter.toml"
+CASE = EXAMPLES.parent / "tests" / "data" / "cases" / "s7_static_joint_gravity.toml"
 
 
 def test_intervals_agree_with_counted_roots(cli):
@@ -37,3 +39,22 @@ def test_ranges_are_listed_in_words(cli):
     code, text, err = cli("margin", BAXTER, "--horizon-ms", "0")
     assert (code, text) == (2, "")
     assert "horizon" in err
+
+
+def test_a_horizon_beyond_counting_is_refused(tmp_path, cli):
+    """A motor on a hard spring, hardly damped, whose roots cross hundreds of times a second."""
+    fast, text = tmp_path / "fast.toml", CASE.read_text()
+    for old, new in (
+        ('"one.urdf"', f'"{CASE.parent}/one.urdf"'), ("=100.0", "=1e5"), ("=60.0", "=1.0"),
+        ("=90.0", "=5000.0"),
+    ):  # fmt: skip
+        assert old in text
+        text = text.replace(old, new, 1)
+    fast.write_text(text)
+    code, text, err = cli("margin", fast, "--horizon-ms", "1e6")
+    assert (code, text, err.count("\n")) == (2, "", 1)
+    short = re.search(r"--horizon-ms (\S+)\)", err)
+    assert short is not None
+    code, text, _ = cli("margin", fast, "--horizon-ms", short[1], "--json")
+    assert code == 0
+    assert 1_000 < len(json.loads(text)["intervals"]) <= 10_000

@@ -92,6 +92,13 @@ def test_the_bundled_walk_is_the_default_one():
     assert set(section["options"]) == {field.name for field in fields(WalkingOptions)}
 
 
+def test_a_side_that_is_not_judged_says_why(tmp_path, cli):
+    arguments = (EXAMPLES / "baxter.toml", "--duration", "0.01", "--out", tmp_path / "r.mcap")
+    said = f"{'controller side':26} not judged: the reference moves\n"
+    assert said in cli("simulate", *arguments, "--scenario", "track")[1]
+    assert "not judged" not in cli("simulate", *arguments, "--scenario", "regulate")[1]
+
+
 def test_same_seed_same_run(tmp_path, cli):
     text = (EXAMPLES / "baxter.toml").read_text()
     path = tmp_path / "noisy.toml"
@@ -136,6 +143,10 @@ def test_a_fall_is_a_named_result(tmp_path, cli):
     assert code == 0
     assert answer["outcome"] == "fell"
     assert "tilted" in answer["message"]
+    arguments = ("--scenario", "regulate", "--out", tmp_path / "r.mcap")
+    code, text, _ = cli("simulate", "bundled:hume", *arguments)
+    assert code == 0
+    assert text.splitlines()[0] == f"{'outcome':26} fell: {answer['message']}"
     assert read_recording(tmp_path / "r.mcap").complete
 
 
@@ -166,6 +177,7 @@ def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, cli, monkeypatch)
         (["--duration", "nan"], "duration"),
         (["--delay-scale", "-1"], "--delay-scale"),
         (["--out", ""], "--out"),
+        (["--log-ms", "20.3"], "the log period of 20.3 ms"),
     ],
 )
 def test_bad_scenarios_are_named(arguments, word, tmp_path, cli):

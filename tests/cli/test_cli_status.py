@@ -1,9 +1,10 @@
-"""Exit statuses: 0 yes, 1 a decided no, 2 wrong input, 3 the tool failed, 130 interrupted."""
+"""Exit statuses: 0 yes, 1 a decided no, 2 wrong input or output, 3 the tool failed, 130 Ctrl-C."""
 
 import json
 import os
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -18,7 +19,7 @@ from sealag.errors import (
 )
 
 HELD = str(EXAMPLES / "hume_held.toml")
-ALONE = (sys.executable, "-c", "from sealag.cli import main; main()")
+ALONE = (sys.executable, "-m", "sealag")
 
 COMMANDS = {
     "init": (["init", "robot.urdf"], "sealag.design.starter_project"),
@@ -71,7 +72,35 @@ def test_yes_and_no_are_the_controls(tmp_path, cli):
     out.write_text(json.dumps({**data, "delay_s": 10.0}))
     assert cli("verify", out)[0] == 1
     assert cli("certify", "bundled:hume", "--out", out)[0] == 1
+    code, text, _ = cli("verify", out)
+    assert code == 0
+    assert text.endswith("the certificate holds: as it states, the design is not certified\n")
+    assert json.loads(cli("verify", out, "--json")[1])["status"] == "not_certified"
     assert cli("certify", tmp_path / "none.toml", "--out", out)[0] == 2
+
+
+EARLY = """
+import runpy
+import sys
+
+class Stop:
+    def find_spec(self, name, path=None, target=None):
+        if name == "sealag.cli":
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Stop())
+runpy.run_module("sealag", run_name="__main__")
+"""
+
+
+def test_ctrl_c_while_the_command_line_loads_is_told():
+    done = subprocess.run(
+        [sys.executable, "-c", EARLY, "cite"], capture_output=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (130, b"")
+    assert done.stderr == b"sealag: interrupted\n"
+    scripts = tomllib.loads((EXAMPLES.parent / "pyproject.toml").read_text())["project"]["scripts"]
+    assert scripts == {"sealag": "sealag.__main__:main"}
 
 
 def test_an_answer_that_nobody_can_read_is_no_yes(tmp_path):
@@ -80,14 +109,20 @@ def test_an_answer_that_nobody_can_read_is_no_yes(tmp_path):
     good = subprocess.run(command, capture_output=True, timeout=300, check=False)
     assert good.returncode == 0
     with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            command, stdout=full, stderr=subprocess.PIPE, timeout=300, check=False
-        )
-    assert done.returncode == 3
-    assert b"No space left" in done.stderr
-    assert b"Traceback" not in done.stderr
+        for words in (command[len(ALONE) :], ["cite"], ["--help"]):
+            done = subprocess.run(
+                [*ALONE, *words], stdout=full, stderr=subprocess.PIPE, timeout=300, check=False
+            )
+            assert done.returncode == 2
+            said = b"sealag: the answer cannot be written: No space left on device.\n"
+            assert done.stderr == said
+        for words, status in (["certify", "none.toml"], 2), (["frobnicate"], 2), (["cite"], 0):
+            done = subprocess.run(
+                [*ALONE, *words], stdout=subprocess.PIPE, stderr=full, timeout=300, check=False
+            )
+            assert done.returncode == status
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=300, check=False)
     os.close(writer)
-    assert (done.returncode, done.stderr) == (3, b"")
+    assert (done.returncode, done.stderr) == (2, b"")

@@ -1,5 +1,6 @@
 """Streams that are closed, names that are orders, failures of the tool itself."""
 
+import json
 import os
 import re
 import subprocess
@@ -27,7 +28,7 @@ def closed(streams, *words, folder):
 
 
 @pytest.mark.parametrize(
-    ("streams", "status"), [("<&-", 0), ("2>&-", 0), (">&-", 3), ("<&- >&- 2>&-", 3)]
+    ("streams", "status"), [("<&-", 0), ("2>&-", 0), (">&-", 2), ("<&- >&- 2>&-", 2)]
 )
 def test_closed_streams_change_no_verdict_and_no_file(streams, status, tmp_path):
     """A file must not get the number of a closed stream: what is printed would land in it."""
@@ -61,6 +62,23 @@ def test_names_reach_the_terminal_as_text(name, tmp_path, cli):
     code, text, _ = cli("certify", path, "--out", tmp_path / f"{name}.json")
     assert code == 0
     assert not orders.search(text)
+
+
+def test_bytes_that_are_no_text_are_written_out_or_refused(tmp_path, cli):
+    """A path of any bytes: JSON has no half of a surrogate pair for them, TOML no letter."""
+    strange = Path(os.fsdecode(os.fsencode(tmp_path) + b"/b\xffd"))
+    project = strange.with_suffix(".toml")
+    project.write_text(ANYWHERE)
+    out = strange.with_suffix(".mcap")
+    code, text, _ = cli("simulate", project, "--duration", "0.002", "--out", out, "--json")
+    assert code == 0
+    assert json.loads(text)["recording"] == f"{tmp_path}/b\\udcffd.mcap"
+    urdf = strange.with_suffix(".urdf")
+    urdf.write_bytes((CASE.parent / "one.urdf").read_bytes())
+    code, _, err = cli("init", urdf, "--fixed", "--out", tmp_path / "p.toml")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "no UTF-8" in err
+    assert not (tmp_path / "p.toml").exists()
 
 
 def test_letters_that_a_stream_lacks_are_written_out(tmp_path):

@@ -225,9 +225,9 @@ def test_overtaking_is_bounded_by_the_spread():
 
 
 def test_bad_delays_are_refused():
-    with pytest.raises(InputError, match="add up to d_1 = 6 s"):
+    with pytest.raises(InputError, match="add up to d_1 = 6000 ms"):
         Delays(central=Constant(4.0), embedded=Constant(4.0))
-    with pytest.raises(InputError, match="ms meant"):
+    with pytest.raises(InputError, match="20000 ms"):
         Constant(20.0)
     with pytest.raises(InputError, match="negative"):
         Constant(-0.01)

@@ -147,6 +147,15 @@ def test_a_limit_of_zero_is_named():
     }
 
 
+def test_joint_damping_of_the_urdf_is_named():
+    system = case("dampbest")
+    damped = replace(system, robot=replace(system.robot, damping=np.full(system.robot.n, 0.1)))
+    still = replace(system, robot=replace(system.robot, damping=np.zeros(system.robot.n)))
+    for one, named in ((damped, True), (still, False)):
+        keys = {part.key for part in sealag.certify(one).answer.assumptions}
+        assert ("joint_damping" in keys) is named
+
+
 def test_a_motor_without_its_torque_does_not_hold_the_arm():
     """The limit acts in the simulator as well."""
     system = case("s2_torque_limit_one_joint")

@@ -163,6 +163,43 @@ def test_files_of_the_user_with_names_like_drafts_stay(tmp_path):
     assert precious.read_text() == "mine"
 
 
+def test_a_draft_with_another_name_is_a_whole_file_and_stays_one(tmp_path):
+    """As a writer leaves it that is killed after it has named a new file."""
+    whole, draft = tmp_path / "a.txt", tmp_path / ".a.txt.sealag-draft"
+    whole.write_text("whole")
+    os.link(whole, draft)
+    with Draft(whole) as second:
+        second.file.write(b"half")
+        assert whole.read_text() == "whole"
+    assert whole.read_text() == "whole"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+@pytest.mark.parametrize("keep", [lambda d: d.keep(), lambda d: d.keep_beside("incomplete")])
+def test_a_file_put_in_a_draft_s_place_is_not_named(keep, tmp_path):
+    path, hidden = tmp_path / "a.txt", tmp_path / ".a.txt.sealag-draft"
+    with Draft(path) as draft:
+        hidden.unlink()
+        hidden.write_text("another's")
+        with pytest.raises(FileError, match="somebody has replaced its unfinished file"):
+            keep(draft)
+    assert hidden.read_text() == "another's"
+    assert not path.exists()
+
+
+def test_a_link_that_leads_back_to_itself_is_refused_and_stays(tmp_path):
+    loop, folder = tmp_path / "a.txt", tmp_path / "folder"
+    loop.symlink_to("b.txt")
+    (tmp_path / "b.txt").symlink_to("a.txt")
+    folder.symlink_to("folder")
+    for wrong in (loop, folder / "c.txt"):
+        for ask in (check_output, lambda path: write_text(path, "x")):
+            with pytest.raises(FileError, match="leads back to itself"):
+                ask(wrong)
+    assert loop.is_symlink()
+    assert folder.is_symlink()
+
+
 def test_a_new_file_replaces_none(tmp_path):
     path = tmp_path / "a.txt"
     write_text(path, "first", replace=False)

@@ -1,5 +1,7 @@
 """What is no matrix of real numbers is refused in one sentence that says why."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -50,3 +52,19 @@ def test_numbers_of_other_kinds_are_taken() -> None:
 
     assert delay_margin([[0]], [[Fraction(-1)]]).delay == pytest.approx(np.pi / 2)
     assert delay_margin([[False]], [[-1]]).delay == pytest.approx(np.pi / 2)
+
+
+def test_a_horizon_with_endless_crossings_names_one_that_is_short_enough() -> None:
+    """A root crosses every 2π s: the list of 1e12 s would need terabytes."""
+    with pytest.raises(
+        InputError, match=r"horizon is 1e\+15 ms \(1e\+12 s\).* at most 10,000 are listed"
+    ) as no:
+        delay_margin([[0.0]], [[-1.0]], horizon=1e12)
+    short = re.search(r"ask for (\S+) s \(--horizon-ms (\S+)\)", str(no.value))
+    assert short is not None
+    seconds, milliseconds = map(float, short.groups())
+    assert milliseconds == pytest.approx(1e3 * seconds)
+    assert 5_000 < len(delay_margin([[0.0]], [[-1.0]], horizon=seconds).intervals) <= 10_000
+    slow_and_fast = np.diag([-1.0, -1e6])
+    with pytest.raises(InputError, match=r"horizon is .* are listed"):
+        delay_margin(0.0 * slow_and_fast, slow_and_fast, intervals=True)

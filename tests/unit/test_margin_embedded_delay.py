@@ -141,3 +141,11 @@ def test_what_feeds_back_late_counts_without_delay_too():
     grows = delay_margin(**loop, A_e=[[2.0]])
     assert (grows.delay, grows.unstable_roots) == (0.0, 1)
     assert delay_margin(**loop, A_e=[[-2.0]]).unstable_roots == 0
+
+
+def test_roots_of_an_endless_embedded_delay_are_counted_and_not_listed() -> None:
+    """A pair crosses at e = π/2 + 2πk: a list of them would need terabytes."""
+    answer = delay_margin([[0.0]], [[0.0]], A_e=[[-1.0]], embedded_delay=1e12)
+    assert answer.unstable_roots == pytest.approx(1e12 / np.pi, rel=1e-9)
+    answer = delay_margin([[0.0]], [[0.0]], A_e=[[-1.0]], embedded_delay=100.0)
+    assert answer.unstable_roots == 2 * np.ceil((100.0 - np.pi / 2) / (2.0 * np.pi))

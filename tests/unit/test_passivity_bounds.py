@@ -185,3 +185,17 @@ def test_a_refused_instant_has_no_delay_and_says_why():
     assert refused.delay[0] == bound.delay[0]
     assert refused.refusals == ("the second is refused",)
     assert solve(bound.problem, share=Instant()).refusals == ()
+
+
+def test_instants_that_are_not_there_are_named():
+    """Of a single instant, which has no number, and of a motion that is shorter."""
+    F = np.diag([1.0, 8.0, 2.0])
+    single, motion = instant_bound(F, D), instant_bound(np.stack([F, 2 * F]), D)
+    for ask in ("prove", "worst_motion"):
+        with pytest.raises(InputError, match="no instant 0; the problem has one instant, without"):
+            getattr(single, ask)(0)
+        with pytest.raises(InputError, match=r"no instant 2; the problem has \(2,\) instants"):
+            getattr(motion, ask)(2)
+    assert single.eased(0.999).prove().residual().lowest > 0.0
+    assert motion.eased(0.999).prove(1).residual().lowest > 0.0
+    np.testing.assert_array_equal(single.worst_motion(), motion.worst_motion(0))

@@ -300,3 +300,13 @@ def test_an_unbounded_delay_needs_a_law_without_stiffness():
         proofs=[], common_multiplier_delay_s=None, time_varying_delay_s=None, conservatism=None,
     )  # fmt: skip
     assert "unbounded delay" in failures(data)
+
+
+@pytest.mark.parametrize(
+    ("design", "words"),
+    [("baxter", "0 rad away"), ("flying", "none near the posture"), ("moving", "none for a")],
+)
+def test_an_equilibrium_that_was_not_found_is_nowhere(design, words):
+    (check,) = (check for check in verify(made(design)).checks if check.name == "equilibrium")
+    assert check.ok
+    assert check.detail.startswith(words)

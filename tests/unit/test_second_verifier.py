@@ -139,14 +139,31 @@ def test_it_runs_as_a_file_and_by_the_command(tmp_path, capsys):
     path.write_text(json.dumps(resealed(data)))
     assert alone(path)[0] == 1
     assert command(path)[0] == 1
-    for text in ("{", "[]", json.dumps({**data, "joints": 3}), '{"schema": 1, "schema": 2}',
-                 json.dumps({**data, "delay_s": None})):  # fmt: skip
+    whole = json.dumps(data)
+    for text, words in (
+        ("{", "Expecting property name"),
+        ("[]", "it is not sealag-certificate/4"),
+        ('{"schema": 1, "schema": 2}', "a key stands twice"),
+        (json.dumps({**data, "joints": 3}), "an entry is of another type or size"),
+        (json.dumps({**data, "delay_s": None}), "'None' is no finite number"),
+        (json.dumps({**data, "hashes": {}}), "a key is missing: 'content'"),
+        (json.dumps({**data, "critical": {}}), "a key is missing: 'instant'"),
+        (whole.replace('"delay_s": ', '"delay_s": 1e999', 1), "is no finite number"),
+        (whole.replace('"instants": 1', '"instants": ' + 5000 * "9", 1), "is no finite number"),
+        (whole.replace('"delay_s": ', '"delay_s": NaN, "x": ', 1), "'NaN' is no finite number"),
+    ):
         path.write_text(text)
-        assert alone(path)[0] == 2
-        code, _, err = command(path)
-        assert code == 2
-        assert err.startswith("sealag: ")
+        code, out = alone(path)
+        assert (code, out.count("\n")) == (2, 1)
+        assert words in out
+        code, out, err = command(path)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"sealag: {path} is not a certificate: ")
+        assert words in err
         assert err.count("\n") == 1
+    code, _, err = command(tmp_path / "none.json")
+    assert (code, err.count("none.json")) == (2, 1)
+    assert "is not a certificate: No such file or directory." in err
     code, _, err = command(path, "--exact")
     assert code == 2
     assert "--second takes no --exact" in err

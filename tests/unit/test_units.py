@@ -33,7 +33,14 @@ def test_milliseconds_are_thousandths_of_a_second():
     assert seconds_from_ms(8.0) == pytest.approx(0.008)
 
 
-@pytest.mark.parametrize(("value", "words"), [(8.0, "8 ms meant"), (-1.0, "negative"), (6.0, "ms")])
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (8.0, r"8000 ms \(8 s\), longer than 5000 ms; was another unit"),
+        (-0.02, "-20 ms; .* negative"),
+        (6.0, "ms"),
+    ],
+)
 def test_a_delay_that_cannot_be_one_is_refused(value, words):
     """5 s is a satellite link; 8 s is 8 ms, written so."""
     assert check_delay_s(5.0, "The delay") == 5.0

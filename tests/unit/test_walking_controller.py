@@ -67,8 +67,12 @@ def test_refusals(hume):
         WalkingOptions(swing_stiffness=float("nan"))
     with pytest.raises(InputError, match=r"lead_time is 0\.0; it must lie in 1e-06"):
         WalkingOptions(lead_time=0.0)
-    with pytest.raises(ValueError, match="static_joint_tank"):
+    with pytest.raises(InputError, match=r"walking\.options\.feedback is 'static_joint_tank'; it"):
         WalkingOptions(feedback="static_joint_tank")
+    with pytest.raises(
+        InputError, match=r"walking\.options\.preview is 1; it must be true or false"
+    ):
+        WalkingOptions(preview=1)
     controller = begin_walk(hume.robot, hume.actuators, hume.walking).controller
     robot = hume.robot
     both = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n, contacts=2)

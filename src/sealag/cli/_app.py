@@ -1,5 +1,6 @@
 """The command line: options, exit statuses, messages. Commands import what they use."""
 
+import errno
 import os
 import shlex
 import sys
@@ -12,21 +13,24 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from sealag.cli._terminal import open_streams, show
+from sealag.cli._terminal import open_streams, show, write_no_more
 from sealag.errors import SealagError, SolverError
 from sealag.version import __version__
 
-WRONG_INPUT, FAILED = 2, 3
+WRONG, FAILED = 2, 3
 """Exit statuses besides 0, yes, and 1, a decided no."""
 
 INTERRUPTED = 130
 """Exit status with which Typer answers Ctrl-C."""
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""How a disk answers that takes no more."""
+
 app = typer.Typer(
     name="sealag",
     help="How much network delay a robot with springs in its joints tolerates.",
     epilog="Exit status: 0 yes or done, 1 no (not certified, certificate does not hold), 2 wrong "
-    "input, 3 the tool failed or its answer could not be written, 130 interrupted.",
+    "input or an answer that cannot be written, 3 the tool failed, 130 interrupted.",
     context_settings={"help_option_names": ["-h", "--help"]},
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -63,15 +67,29 @@ def _options(
 
 @app.command()
 def init(
-    urdf: Annotated[str, typer.Argument(help="The robot's URDF.")],
+    urdf: Annotated[
+        str,
+        typer.Argument(
+            help="The robot's URDF: a path, bundled:hume.urdf, or example-robot-data:PATH of that "
+            "package."
+        ),
+    ],
     out: Annotated[
-        Path | None, typer.Option("--out", help="Project file to write. Default: ROBOT.toml.")
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Project file to write; its folder is made if needed. Default: ROBOT.toml.",
+        ),
     ] = None,
     floating: Annotated[
         bool, typer.Option("--floating/--fixed", help="Whether the base floats.")
     ] = True,
 ) -> None:
-    """Write a commented project file with the robot's own joints in it."""
+    """Write a commented project file with the robot's own joints in it.
+
+    The posture is a group state of an SRDF in the URDF's folder, or in a folder srdf there or
+    beside it, whose name begins with standing, half_sitting, homing, home, default or neutral.
+    """
     from sealag.cli._commands import init_project
 
     path = init_project(urdf, out, floating_base=floating)
@@ -88,7 +106,11 @@ def certify(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Certificate to write. Default: PROJECT.certificate.json."),
+        typer.Option(
+            "--out",
+            help="Certificate to write; its folder is made if needed. Default: "
+            "PROJECT.certificate.json.",
+        ),
     ] = None,
     time_varying: Annotated[
         bool,
@@ -209,7 +231,11 @@ def simulate(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Recording to write. Default: PROJECT.mcap.")
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Recording to write; its folder is made if needed. Default: PROJECT.mcap.",
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -233,9 +259,9 @@ def paper(
     project: Annotated[
         str, typer.Argument(help="Project file of Hume with a [walking] section.")
     ] = "bundled:hume",
-    out: Annotated[Path, typer.Option("--out", help="Folder for page and CSVs.")] = Path(
-        "out/paper"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder for page and CSVs; it is made if needed.")
+    ] = Path("out/paper"),
     quick: Annotated[
         bool, typer.Option("--quick", help="Only a few cases of each table, in minutes.")
     ] = False,
@@ -253,14 +279,6 @@ def cite(as_json: Json = False) -> None:
     from sealag.cli._cite import show_citations
 
     show_citations(as_json=as_json)
-
-
-def _write_no_more() -> None:
-    """Discard unwritten output: flushing it at exit would change the status."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _report(error: Exception, words: Sequence[str]) -> str:
@@ -281,24 +299,14 @@ def _report(error: Exception, words: Sequence[str]) -> str:
     return path
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and end the process with its status.
-
-    0 yes or done, 1 no, 2 wrong input, 3 the tool failed or its answer could not be written, 130
-    interrupted. Wrong input and failures are one sentence on standard error.
-
-    Args:
-        arguments: what follows the program's name; the process's own if None.
-    """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    answered = open_streams()
-    words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+def _status(words: Sequence[str]) -> int:
+    """Run the command line and return its status; what goes wrong is one sentence."""
     try:
         status = app(args=words, prog_name="sealag", standalone_mode=False)
         sys.stdout.flush()
     except SealagError as error:
         show(f"sealag: {error}", error=True)
-        raise SystemExit(FAILED if isinstance(error, SolverError) else WRONG_INPUT) from None
+        return FAILED if isinstance(error, SolverError) else WRONG
     except TyperException as error:
         known = {
             command.callback.__name__ for command in app.registered_commands if command.callback
@@ -306,12 +314,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         asked = f"{words[0]} " if words[0] in known else ""
         problem = error.format_message().rstrip(".")
         show(f"sealag: {problem}; see sealag {asked}--help.", error=True)
-        raise SystemExit(WRONG_INPUT) from None
+        return WRONG
     except (BrokenPipeError, SystemExit):  # Typer ends with 1, a no, when the reader is gone
-        _write_no_more()
-        raise SystemExit(FAILED) from None
+        return WRONG
     except Exception as error:
-        _write_no_more()
+        if isinstance(error, OSError) and error.errno in _FULL:
+            show(f"sealag: the answer cannot be written: {error.strerror}.", error=True)
+            return WRONG
         said = " ".join(str(error).split())[:300]
         report = _report(error, words)
         show(
@@ -319,10 +328,26 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"about the design. Please report it with {report or 'the command'} and its files.",
             error=True,
         )
-        raise SystemExit(FAILED) from None
+        return FAILED
     if status == INTERRUPTED:
         show("sealag: interrupted", error=True)
+    return status or 0
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and end the process with its status.
+
+    0 yes or done, 1 no, 2 wrong input or an answer that cannot be written, 3 the tool failed, 130
+    interrupted. What goes wrong is one sentence on standard error.
+
+    Args:
+        arguments: what follows the program's name; the process's own if None.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    answered = open_streams()
+    status = _status(list(sys.argv[1:] if arguments is None else arguments) or ["--help"])
     if not answered and status in (0, 1):
         show("sealag: standard output is closed; nobody can read the answer", error=True)
-        raise SystemExit(FAILED)
-    raise SystemExit(status or 0)
+        status = WRONG
+    write_no_more(sys.stdout)
+    raise SystemExit(status)

@@ -22,6 +22,8 @@ STUDY = "humanoids2016"
 """The package that reproduces the paper: a guest, which the library does not import."""
 LARGEST_LIST = 250
 """Checks that hold and are shown one by one."""
+LONGEST_COUNT = 9
+"""Digits of a number of instants: no motion has more."""
 
 
 def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
@@ -69,6 +71,14 @@ def _motion(system: System, path: Path | None) -> Motion | None:
     return design.load_motion(chosen, system.robot, contacts=system.contacts)
 
 
+def _count(proofs: str) -> int:
+    """How many instants --proofs asks for."""
+    number = proofs.isascii() and proofs.isdigit() and len(proofs) <= LONGEST_COUNT
+    if not number or int(proofs) < 1:
+        raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
+    return int(proofs)
+
+
 def certify_project(
     project: str,
     motion: Path | None,
@@ -82,12 +92,11 @@ def certify_project(
     """Certify, write the certificate and show the answer; 1 if it is not certified."""
     if criterion is not None and criterion not in set(Criterion):
         raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
-    if proofs != "all" and not (proofs.isascii() and proofs.isdigit() and int(proofs) > 0):
-        raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
+    count = None if proofs == "all" else _count(proofs)
     path = out or Path(f"{design.resolve_project(project).stem}.certificate.json")
     system = design.load(project)
     check_output(path, *system.files, *([motion] if motion else []))
-    along, count = _motion(system, motion), None if proofs == "all" else int(proofs)
+    along = _motion(system, motion)
     design.check_question(system, along, criterion, time_varying=time_varying, proofs=count)
     with Draft(path) as draft:
         compile_kernels()
@@ -221,27 +230,28 @@ def verify_certificate(
         for check in result.checks:
             if not check.ok:
                 show(f"BAD  {check.name}: {check.detail}")
-        show("the certificate holds" if result.valid else "the certificate does not hold")
+        certified = result.status is Status.CERTIFIED
+        stated = "" if certified else ": as it states, the design is not certified"
+        show(f"the certificate holds{stated}" if result.valid else "the certificate does not hold")
     return 0 if result.valid else 1
 
 
 def _second(path: Path, *, as_json: bool) -> int:
     """Show what the second verifier decides; 1 if a claim does not hold."""
-    from sealag.second_verifier import claims, read
+    from sealag.second_verifier import WrongInputError, decided
 
-    found, words = [], {True: "holds", False: "does not hold", None: "cannot decide"}
     try:
-        for name, holds, detail in claims(read(str(path))):
-            found.append({"name": name, "holds": holds, "detail": detail})
-            if not as_json:
-                show(f"{words[holds]:14} {name}: {detail}".rstrip(": "))
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        problem = str(error)[:200]
-        raise CertificateError(f"{path} is not a certificate: {problem}.") from error
-    valid = all(one["holds"] is not False for one in found)
+        found = decided(str(path))
+    except WrongInputError as error:
+        raise CertificateError(f"{path} is not a certificate: {error}.") from error
+    valid = all(holds is not False for _, holds, _ in found)
     if as_json:
-        show_json({"valid": valid, "claims": found})
+        names = ("name", "holds", "detail")
+        show_json({"valid": valid, "claims": [dict(zip(names, one)) for one in found]})
     else:
+        words = {True: "holds", False: "does not hold", None: "cannot decide"}
+        for name, holds, detail in found:
+            show(f"{words[holds]:14} {name}: {detail}".rstrip(": "))
         show("no claim fails" if valid else "the certificate does not hold")
     return 0 if valid else 1
 

@@ -69,12 +69,13 @@ def simulate_project(
         )
         saved = _record(run, system, draft)
     answer = run_summary(run, recording=saved)
-    if (system.simulation.scenario if scenario is None else scenario) == "walk":
+    kind = system.simulation.scenario if scenario is None else scenario
+    if kind == "walk":
         answer |= gait_summary(system, run)
     if as_json:
         show_json(answer)
     else:
-        _show(run, answer)
+        _show(run, answer, kind)
     if run.outcome is Outcome.INTERRUPTED:
         raise KeyboardInterrupt
 
@@ -140,9 +141,9 @@ def gait_summary(system: System, run: Run) -> dict[str, Any]:
     }
 
 
-def _show(run: Run, answer: dict[str, Any]) -> None:
+def _show(run: Run, answer: dict[str, Any], scenario: str) -> None:
     books = run.audit
-    show(f"{'outcome':26} {answer['outcome']} {answer['message']}".rstrip())
+    show(f"{'outcome':26} {answer['outcome']}: {answer['message']}".rstrip(": "))
     show(f"{'simulated':26} {answer['duration_s']:.3f} s")
     show(f"{'measurement at most':26} {answer['measurement_age_s'] * 1e3:.2f} ms old")
     show(f"{'command at most':26} {answer['command_age_s'] * 1e3:.2f} ms old")
@@ -176,6 +177,9 @@ def _show(run: Run, answer: dict[str, Any]) -> None:
     for name, side in sides.items():
         if side is not None:
             show(f"{name:26} {side.verdict}")
+    if books.controller_side is None:
+        why = "the reference moves" if scenario == "track" else "the law states no potential"
+        show(f"{'controller side':26} not judged: {why}")
     if "steps" in answer:
         speeds = ", ".join(f"{v:.2f}" for v in answer["apex_speed_m_s"])
         widths = ", ".join(f"{w:.2f}" for w in answer["step_width_m"])

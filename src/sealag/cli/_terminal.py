@@ -4,11 +4,14 @@ import io
 import os
 import sys
 import unicodedata
+from contextlib import suppress
 from typing import TextIO
 
 _HIDDEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 """Unicode categories of characters that are not shown but act: control characters, C1 and those
 that turn the direction of writing among them."""
+_LONGEST = 2000
+"""Letters of a message."""
 
 
 def plain(text: str) -> str:
@@ -27,9 +30,29 @@ def show(text: str = "", *, error: bool = False) -> None:
 
     Args:
         text: the line.
-        error: whether it goes to standard error.
+        error: whether it goes to standard error, where the middle of a long one is left out: a
+            message may quote what a file says.
     """
-    print(plain(text), file=sys.stderr if error else sys.stdout, flush=error)
+    if error and len(text) > _LONGEST:
+        text = f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
+    if not error:
+        print(plain(text))
+        return
+    with suppress(OSError):  # a full disk: what it was about changes no status
+        print(plain(text), file=sys.stderr, flush=True)
+    write_no_more(sys.stderr)
+
+
+def write_no_more(stream: TextIO) -> None:
+    """Write what a stream holds, or discard it: failing to do so at exit would change the status.
+
+    Args:
+        stream: standard output or standard error.
+    """
+    try:
+        stream.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def open_streams() -> bool:

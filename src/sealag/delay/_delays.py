@@ -7,7 +7,7 @@ from sealag.delay._link import Link, PacketOrder
 from sealag.delay._signal import DelaySignal, Share
 from sealag.errors import InputError
 from sealag.typing import Array
-from sealag.units import LONGEST_DELAY_S, check_delay_s
+from sealag.units import LONGEST_DELAY_S, check_delay_s, in_ms
 
 UNSTATED_PERIOD = 1e-3
 """Period of a controller that runs where none is stated, s."""
@@ -148,13 +148,14 @@ class Delays:
             object.__setattr__(self, name, value)
         if embedded_period > sample_time > 0.0:
             raise InputError(
-                f"The embedded period {embedded_period:g} s is longer than the central one, "
-                f"{sample_time:g} s."
+                f"The embedded period {in_ms(embedded_period)} is longer than the central one, "
+                f"{in_ms(sample_time)}."
             )
         if self.d_1 > LONGEST_DELAY_S:
             raise InputError(
-                f"The delays add up to d_1 = {self.d_1:g} s, longer than {LONGEST_DELAY_S:g} s; "
-                "shorten delays, jitter, periods or bursts of lost packets (max_burst)."
+                f"The delays add up to d_1 = {in_ms(self.d_1)}, longer than "
+                f"{in_ms(LONGEST_DELAY_S)}; shorten delays, jitter, periods or bursts of lost "
+                "packets (max_burst)."
             )
 
     @property

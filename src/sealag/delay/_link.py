@@ -13,6 +13,7 @@ from sealag.typing import Array, IntArray
 _SAME = 1e-9  # s; an arrival this close after the receiver's look is at the look
 _HALVINGS = 60
 _BLOCK = 1024
+_LONGEST_BURST = 1e9
 
 
 class PacketOrder(StrEnum):
@@ -52,8 +53,8 @@ class Link:
             raise InputError(f"jitter must be a finite number >= 0 s, got {self.jitter}")
         if not 0 <= self.loss < 1:
             raise InputError(f"loss must be a probability in [0, 1), got {self.loss}")
-        if self.max_burst < 1:
-            raise InputError(f"max_burst must be at least 1 packet, got {self.max_burst}")
+        if not 1 <= self.max_burst <= _LONGEST_BURST:
+            raise InputError(f"max_burst must be 1 … {_LONGEST_BURST:g} packets")
         object.__setattr__(self, "order", PacketOrder(self.order))
 
     @property

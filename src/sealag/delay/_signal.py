@@ -8,7 +8,7 @@ import numpy as np
 
 from sealag.errors import InputError
 from sealag.typing import Array, ArrayLike
-from sealag.units import check_delay_s
+from sealag.units import check_delay_s, in_ms
 
 
 class DelaySignal(Protocol):
@@ -125,8 +125,8 @@ class Sinusoid:
         check_delay_s(self.mean + self.amplitude, "The sinusoid's largest delay")
         if self.amplitude > self.mean:
             raise InputError(
-                f"The sinusoid's amplitude {self.amplitude:g} s exceeds its mean {self.mean:g} s, "
-                "so that the delay would become negative."
+                f"The sinusoid's amplitude {in_ms(self.amplitude)} exceeds its mean "
+                f"{in_ms(self.mean)}, so that the delay would become negative."
             )
         if not (math.isfinite(self.angular_frequency) and math.isfinite(self.phase)):
             raise InputError("The sinusoid's angular frequency and phase must be finite.")

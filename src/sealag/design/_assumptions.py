@@ -164,6 +164,12 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
             "Coulomb friction (coulomb_friction, or the URDF's friction, taken at the motor) only "
             "dissipates; it leaves a static error, and the local margin assumes sliding motors.",
         )
+    if (robot.damping > 0.0).any():
+        yield (
+            "joint_damping",
+            "The URDF's joint damping acts at the links: stability and margin rely on it, the "
+            "passive bound does not.",
+        )
     left_out = [
         name
         for name, stated, used in (

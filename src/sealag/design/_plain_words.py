@@ -33,8 +33,13 @@ def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> s
         path: what the message calls the file.
 
     Returns:
-        The sentence; it names the file, the key, what was found and what is needed.
+        The sentence; it names the file, the key, what was found and what is needed. What a starter
+        file leaves to be filled in comes first, and all of it at once.
     """
+    unfilled = [problem for problem in problems if _is_unfilled(problem)]
+    if unfilled:
+        keys = dict.fromkeys(_key(problem["loc"], data) for problem in unfilled)
+        return f"{path}: still to be filled in: {', '.join(keys)}."
     first = problems[0]
     key = _key(first["loc"], data)
     more = len({tuple(problem["loc"]) for problem in problems}) - 1
@@ -52,11 +57,14 @@ def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> s
             need = f"it must be one of {first['ctx']['expected_tags']}"
         case kind:
             need = _NEEDS[kind].format(**first.get("ctx", {})) if kind in _NEEDS else first["msg"]
-    if isinstance(found, str) and found.startswith("FILL"):
-        return f"{path}: {key} is still to be filled in ({found}).{rest}"
     shown = repr(found) if len(repr(found)) < 60 else f"a {type(found).__name__}"
-    unit = " (a delay in ms: was another unit meant?)" if key.endswith("_ms") else ""
+    unit = " (in ms: was another unit meant?)" if key.endswith("_ms") else ""
     return f"{path}: {key} is {shown}; {need}{unit}.{rest}"
+
+
+def _is_unfilled(problem: Any) -> bool:
+    found = problem.get("input")
+    return isinstance(found, str) and found.startswith("FILL")
 
 
 def _key(place: tuple[Any, ...], data: Any) -> str:

@@ -42,6 +42,7 @@ from sealag.whole_body import Law, Signal, Tank, TankFlow, Task, TaskKind, signa
 
 LARGEST_PROJECT_BYTES = 1_000_000
 LARGEST_SAMPLES_BYTES = 50_000_000
+_TOO_LARGE = "has too many digits; TOML's whole numbers have at most 19"
 _REQUIRED = ("spring_stiffness", "rotor_inertia", "motor_damping", "inertia_shaping")
 
 
@@ -97,12 +98,32 @@ def parse_project(content: bytes, path: Path) -> Any:
 
     try:
         data = tomllib.loads(content.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:  # also of integers with thousands of digits
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ProjectError(f"{path} is not TOML: line {line} is not in UTF-8.") from error
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise ProjectError(f"{path} is not TOML: {error}.") from error
+    except ValueError as error:  # Python reads no whole numbers with thousands of digits
+        raise ProjectError(f"{path}: a whole number {_TOO_LARGE}.") from error
+    for key, value in _leaves(data):
+        if isinstance(value, int) and value.bit_length() > 63:
+            raise ProjectError(f"{path}: {key} {_TOO_LARGE}.")
     try:
         return Project.model_validate(data)
     except ValidationError as error:
         raise ProjectError(first_problem(error.errors(), data, path=path)) from error
+
+
+def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """What stands in a parsed file besides tables and lists, each with its key."""
+    if isinstance(value, dict):
+        for name, entry in value.items():
+            yield from _leaves(entry, f"{key}.{name}".removeprefix("."))
+    elif isinstance(value, list):
+        for number, entry in enumerate(value, start=1):
+            yield from _leaves(entry, f"{key} (entry {number})")
+    else:
+        yield key, value
 
 
 @contextmanager
@@ -134,6 +155,9 @@ def _system(project: Any, path: Path, text: str) -> System:
         task_error=project.controller.task_error,
     )
     law.gain(robot)
+    with _named(path, "simulation.pushes"):
+        for push in project.simulation.pushes:
+            robot.check_frame(push.frame)
     motion_file = folder / project.motion.file if project.motion else None
     if motion_file and not motion_file.is_file():
         raise FileError(f"{path}: motion.file is {project.motion.file!r}; there is no such file.")

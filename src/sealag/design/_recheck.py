@@ -1,6 +1,7 @@
 """Checking a certificate against the design that it names."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,7 @@ def verify_design(
     checks = found.checks
     if found.valid:
         checks += tuple(_recomputed(claimed, system, motion))
-    return Verification(exact=exact, checks=checks)
+    return replace(found, checks=checks)
 
 
 def _recomputed(claimed: Certificate, system: System, motion: Motion | None) -> Iterator[Check]:

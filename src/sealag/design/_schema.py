@@ -64,7 +64,10 @@ Damping = Annotated[FiniteFloat, _within(0, 1e6, "Nms/rad")]
 TorqueOrZero = Annotated[FiniteFloat, _within(0, 1e6, "Nm")]
 Torque = Annotated[FiniteFloat, _within(1e-6, 1e7, "Nm")]
 Rate = Annotated[FiniteFloat, _within(1e-6, 1e7, "rad/s")]
-Gain = Annotated[FiniteFloat, _within(1e-6, 1e9, "1/s²", or_zero=True)]
+Gain = Annotated[
+    FiniteFloat,
+    _within(1e-6, 1e9, "1/s², or N/m or Nm/rad if stiffness_form is force", or_zero=True),
+]
 Duration = Annotated[FiniteFloat, _within(1e-6, 1e6, "s")]
 Seed = Annotated[int, Field(ge=0)]
 

@@ -234,7 +234,7 @@ def _feet(system: System) -> list[Foot]:
 def _pushes(system: System, kind: str) -> list[Push]:
     pushes = [
         Push(
-            frame=system.robot.check_frame(push.frame),
+            frame=push.frame,
             force=(push.force_n[0], push.force_n[1], push.force_n[2]),
             start=push.start_s,
             duration=push.duration_s,

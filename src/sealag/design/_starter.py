@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from sealag.design._starter_text import OPTIONAL, REQUIRED
+from sealag.errors import InputError
 from sealag.robot import ReferencePosture, Robot, load_robot, reference_posture
 from sealag.typing import Array
 
@@ -30,6 +31,7 @@ def starter_project(
     Raises:
         FileError: the URDF cannot be read.
         RobotError: it is not a usable robot.
+        InputError: the path's bytes are no text.
     """
     robot = load_robot(urdf, floating_base=floating_base)
     feet = _feet(robot) if floating_base else []
@@ -54,7 +56,15 @@ def starter_project(
 
 
 def _text(name: str) -> str:
-    """A name as a TOML string."""
+    """A name as a TOML string.
+
+    Raises:
+        InputError: its bytes are no text.
+    """
+    if name != name.encode("utf-8", "ignore").decode("utf-8"):
+        raise InputError(
+            f"The name {name!r} is no UTF-8, and TOML has no letters for it; rename it."
+        )
     return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

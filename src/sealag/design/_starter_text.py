@@ -34,7 +34,7 @@ motor_damping = "FILL: D_theta, Nms/rad (Ns/m where the joint slides), embedded 
 [controller]
 feedback = "motor"             # motor | static_joint | static_joint_tank | joint
 gravity = "planned"            # feedback | planned | none
-stiffness_form = "symmetric"   # symmetric | published | force
+stiffness_form = "symmetric"   # symmetric | published | force (without the task inertia)
 criterion = "certified"        # certified | published
 # task_inertia = "lambda_ts"   # lambda_ts, Eq. (10) | lambda_star, of what the motors move
 # task_error = "consistent"    # consistent (what higher tasks leave) | plain (as printed)
@@ -45,12 +45,13 @@ criterion = "certified"        # certified | published
 [[tasks]]
 name = "posture"
 kind = "posture"               # com | position | orientation | pose | posture
-stiffness = "FILL: 1/s^2, times the task inertia"
+stiffness = "FILL: 1/s^2, times the task inertia; N/m or Nm/rad if stiffness_form is force"
 priority = 1
 
 # Delays are constant, sinusoid (mean_ms, amplitude_ms, angular_frequency_rad_s), table (time_s,
 # delay_ms) or samples (file of measured ones in ms, period_s), each with jitter_ms, packet_loss,
-# max_burst and order ("fifo", "newest", "arrival") if packets are late or lost. Instead of a round
+# max_burst and order ("fifo", "newest", "arrival") if packets are late or lost; these hold for each
+# way of a round trip, so that a jitter counts on the way up and on the way down. Instead of a round
 # trip both of its ways may be given: central_up and central_down, embedded_up and embedded_down.
 [delays]
 central_round_trip = {{ kind = "constant", value_ms = "FILL: T_H, ms" }}

@@ -1,10 +1,9 @@
 """The [walking] section of a project file."""
 
 from dataclasses import fields
-from enum import StrEnum
 from typing import Any
 
-from sealag.errors import InputError, either, near
+from sealag.errors import near
 from sealag.robot import Robot
 from sealag.walking import Ground, GroundProfile, Walking, WalkingGait, WalkingOptions
 
@@ -46,22 +45,8 @@ def _ground(keys: Any) -> Ground:
 
 
 def _filled(kind: type, values: dict[str, Any], where: str) -> Any:
-    defaults = {field.name: field.default for field in fields(kind)}
-    for key, value in values.items():
-        if key not in defaults:
-            raise near(key, defaults, what=f"key of {where}")
-        need = _unlike(value, defaults[key])
-        if need:
-            raise InputError(f"{where}.{key} is {value!r}; it must be {need}.")
+    known = [field.name for field in fields(kind)]
+    for key in values:
+        if key not in known:
+            raise near(key, known, what=f"key of {where}")
     return kind(**values)
-
-
-def _unlike(value: Any, default: Any) -> str:
-    """What a value must be if it is not of its default's kind; else an empty text."""
-    if isinstance(default, StrEnum):
-        choices = [str(member) for member in type(default)]
-        return "" if value in choices else either(choices)
-    if isinstance(default, bool):
-        return "" if isinstance(value, bool) else "true or false"
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return "" if number else "a number"

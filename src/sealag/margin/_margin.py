@@ -1,6 +1,7 @@
 """Exact delay margin of a frozen closed loop with one constant delay."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,12 +21,16 @@ from sealag.margin._pictures import Picture, Turn, frequency_of
 from sealag.margin._roots import loop_roots
 from sealag.margin._search import search
 from sealag.typing import Array, ArrayLike
+from sealag.units import in_ms
 
 _RESIDUAL = 1e-9
 _AT = 1e-9
 _MOST_IF_UNSTABLE = 3_000
 """Samples spent on the first crossing of an unstable loop. Robots need tens to hundreds; ten times
 more take half a minute for zero roots that hide the crossings."""
+_MOST_LISTED = 10_000
+"""Crossings listed up to a horizon. Ten times more are 10 MB of JSON that nobody reads; ten times
+fewer refuse a stiff loop over a few of its slowest periods."""
 _METHOD = "excluded intervals, Newton"
 _UNDAMPED = "undamped motion that the delay does not reach"
 
@@ -135,8 +140,8 @@ def delay_margin(
         The margin.
 
     Raises:
-        InputError: matrices do not fit or are not finite real numbers, or a time is negative or
-            not finite.
+        InputError: matrices do not fit or are not finite real numbers, a time is negative or not
+            finite, or roots cross more often before the horizon than can be listed.
         SolverError: A_0, A_1 or A_e moves a symmetry, a band could be neither excluded nor
             explained, or a check contradicts the answer.
     """
@@ -245,10 +250,10 @@ def _roots_without_delay(loop: Loop, *, sign: float) -> tuple[int, bool]:
         )
     late = resting
     for one in found.crossings:
-        for delay in np.arange(one.delay, (1.0 + _AT) * e, one.period).tolist():
-            late |= abs(delay - e) <= _AT * e
-            already = on_axis and _at_zero(delay, one) and one.direction > 0
-            count += 0 if already else 2 * one.direction
+        passes = max(0, math.ceil(((1.0 + _AT) * e - one.delay) / one.period))
+        late |= passes > 0 and one.delay + (passes - 1) * one.period >= (1.0 - _AT) * e
+        already = passes > 0 and on_axis and _at_zero(one.delay, one) and one.direction > 0
+        count += 2 * one.direction * (passes - already)
     return count, late
 
 
@@ -302,6 +307,7 @@ def _intervals(answer: DelayMargin, *, horizon: float | None) -> tuple[Interval,
     if not moving:
         return (Interval(lower=0.0, upper=math.inf, unstable_roots=unstable),)
     end = horizon if horizon is not None else 20.0 * max(item.period for item in moving)
+    _check_count(moving, end)
     events = sorted(
         (delay, item.direction)
         for item in moving
@@ -314,6 +320,21 @@ def _intervals(answer: DelayMargin, *, horizon: float | None) -> tuple[Interval,
             ranges.append(Interval(lower=lower, upper=delay, unstable_roots=unstable))
         lower, unstable = delay, unstable + 2 * direction
     return (*ranges, Interval(lower=lower, upper=end, unstable_roots=unstable))
+
+
+def _check_count(moving: Sequence[Crossing], end: float) -> None:
+    """Refuse a horizon before which roots cross more often than can be listed."""
+    rate = sum(1.0 / item.period for item in moving)
+    if rate * end <= _MOST_LISTED:
+        return
+    short = (_MOST_LISTED - len(moving)) / rate
+    step = 10.0 ** math.floor(math.log10(short))
+    short = math.floor(short / step) * step
+    raise InputError(
+        f"horizon is {in_ms(end)} ({end:g} s), before which roots cross the axis "
+        f"{rate * end:.1g} times; at most {_MOST_LISTED:,} are listed: ask for {short:g} s "
+        f"(--horizon-ms {short * 1e3:g})."
+    )
 
 
 def _check(loop: Loop, answer: DelayMargin) -> None:

@@ -91,13 +91,17 @@ class Bound:
             raise InputError("A shared multiplier has no single direction; solve with Instant().")
         return self.angle
 
-    def worst_motion(self, instant: int) -> Array:
+    def worst_motion(self, instant: int | None = None) -> Array:
         """Return D_θ^½ θ̇ of the motion that first turns the delayed loop active, (n,) complex.
 
         Args:
-            instant: which one.
+            instant: which one; None for a bound of one instant.
+
+        Raises:
+            InputError: there is no such instant, or the bound has a shared multiplier.
         """
-        A, phi = self.problem.at(instant).scaled_stiffness(), self._angle[instant]
+        at = () if instant is None else instant
+        A, phi = self.problem.at(at).scaled_stiffness(), self._angle[at]
         for _ in range(_TURNS):
             x = _extremal(A, phi)
             before, phi = phi, -np.angle(x.conj() @ A @ x)
@@ -140,7 +144,8 @@ class Bound:
                 Clarabel's own interface if None.
 
         Raises:
-            InputError: the delay is 0 or unbounded, or the bound is a batch.
+            InputError: the delay is 0 or unbounded, the bound is a batch, or there is no such
+                instant.
             SolverError: nothing proves it: the delay is too close to the supremum.
         """
         at = () if instant is None else instant

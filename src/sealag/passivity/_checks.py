@@ -3,6 +3,8 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from sealag.passivity._kinds import Status
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
@@ -28,10 +30,12 @@ class Verification:
     """Outcome of checking a certificate.
 
     Attributes:
+        status: the verdict that the file states.
         exact: whether inequalities were decided in rational arithmetic.
         checks: everything that was checked.
     """
 
+    status: Status
     exact: bool
     checks: tuple[Check, ...]
 

@@ -10,6 +10,7 @@ from sealag.passivity._checks import Check
 from sealag.passivity._kinds import Basis, Criterion, Status
 from sealag.passivity._proofs import AGREEMENT, SYMMETRY, asymmetry
 from sealag.passivity._stated import Stated
+from sealag.passivity._statement import Rest
 from sealag.units import time_text
 
 _FEEDBACK = ("motor", "static_joint", "static_joint_tank", "joint")
@@ -170,8 +171,14 @@ def _margin_checks(c: Stated) -> Iterator[Check]:
     yield Check(
         name="equilibrium",
         ok=(c.question.instants == 1 or rest is None) and (rest is None or rest.moved_rad >= 0.0),
-        detail="none for a motion" if rest is None else f"{rest.moved_rad:.3g} rad away",
+        detail=_resting(rest),
     )
+
+
+def _resting(rest: Rest | None) -> str:
+    if rest is None:
+        return "none for a motion"
+    return f"{rest.moved_rad:.3g} rad away" if rest.found else "none near the posture"
 
 
 def _inexact_margins(c: Stated, floor: float) -> Check:

@@ -160,7 +160,15 @@ class Problem:
 
         Args:
             instants: an index of the batch, as of an array.
+
+        Raises:
+            InputError: there is no such instant.
         """
+        try:
+            np.broadcast_to(0.0, self.batch)[instants]
+        except IndexError:
+            has = f"{self.batch} instants" if self.batch else "one instant, without a number"
+            raise InputError(f"There is no instant {instants!r}; the problem has {has}.") from None
         A_error, M_error = (
             np.broadcast_to(error, (*self.batch, error.shape[-1]))
             for error in (self.A_error, self.M_error)

@@ -68,7 +68,8 @@ def verify(certificate: Path | str | Mapping[str, Any], *, exact: bool = False) 
     data, odd = _plain(certificate)
     found = _typed(data, certificate)
     first = _content_check(data, found, odd)
-    return Verification(exact=exact, checks=(first, *found.checks(exact=exact)))
+    checks = (first, *found.checks(exact=exact))
+    return Verification(status=found.answer.status, exact=exact, checks=checks)
 
 
 def read_certificate(certificate: Path | str | Mapping[str, Any]) -> Certificate:

@@ -6,6 +6,7 @@ from typing import Self
 
 from sealag.delay import Constant, Delays, Link, RoundTrip
 from sealag.errors import InputError
+from sealag.units import in_ms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,8 +92,8 @@ class Clock:
         central = self.steps_of("central", self.central)
         if self.embedded and central % self.steps_of("embedded", self.embedded):
             raise InputError(
-                f"the central period {self.central:g} s must be a whole multiple of the embedded "
-                f"period {self.embedded:g} s"
+                f"the central period of {in_ms(self.central)} must be a whole multiple of the "
+                f"embedded period of {in_ms(self.embedded)}"
             )
 
     def steps_of(self, name: str, period: float) -> int:
@@ -108,7 +109,7 @@ class Clock:
         steps = round(period / self.physics)
         if steps < 1 or abs(period - steps * self.physics) > 1e-9 * period:
             raise InputError(
-                f"the {name} period {period} s must be a whole multiple of the physics step "
-                f"{self.physics} s"
+                f"the {name} period of {in_ms(period)} must be a whole multiple of the physics "
+                f"step of {in_ms(self.physics)} (simulation.physics_step_ms)"
             )
         return steps

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from sealag.constants import GRAVITY
 from sealag.errors import InputError
-from sealag.walking._ranged import check_ranges, ranged
+from sealag.walking._ranged import check_fields, ranged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class WalkingGait:
     smallest_width: float = ranged(0.12, 1e-6, 5.0, "m")
 
     def __post_init__(self) -> None:
-        check_ranges(self, "The gait's")
+        check_fields(self, "walking.gait")
         if self.transfer_time > 0.6 * self.step_time:
             raise InputError(
                 f"The weight transfer of {self.transfer_time:g} s leaves too little of the step of "

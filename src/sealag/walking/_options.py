@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Self
 
-from sealag.walking._ranged import check_ranges, ranged
+from sealag.walking._ranged import check_fields, ranged
 
 
 class Prediction(StrEnum):
@@ -91,9 +91,7 @@ class WalkingOptions:
     feedback: JointAngles = JointAngles.JOINT
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "prediction", Prediction(self.prediction))
-        object.__setattr__(self, "feedback", JointAngles(self.feedback))
-        check_ranges(self, "The walking option")
+        check_fields(self, "walking.options")
 
     def published(self, **changes: Any) -> Self:
         """Return the law of Eqs. (11) and (17) with plain D_θ θ̇: position feedback and gravity.
