@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
+from threadpoolctl import threadpool_info
 
 from sealag.design._along import Along
 from sealag.design._assumptions import assumptions_of
@@ -281,8 +282,20 @@ def _answer(case: _Case) -> Answer:
             "sealag": __version__,
             "python": sys.version.split()[0],
             **{name: version(name) for name in ("numpy", "scipy", "numba", "pin")},
+            "blas": _blas(),
         },
     )
+
+
+def _blas() -> str:
+    """What the last bits of all numbers depend on: the linear algebra's library, the processor that
+    its kernels are for, and its threads."""
+    for found in threadpool_info():
+        if found["user_api"] == "blas":
+            words = (found["internal_api"], found["version"], found.get("architecture"))
+            named = "-".join(str(word) for word in words if word)
+            return f"{named}-{found['num_threads']}threads"
+    return "unknown"
 
 
 def _evidence(case: _Case) -> Evidence:

@@ -139,7 +139,8 @@ class Answer:
         equilibrium: where the loop rests; None for a motion.
         conservatism: local margin over max_delay_s; None where either is 0 or unbounded too.
         assumptions: what is assumed and not checked.
-        versions: of sealag and the libraries that computed it.
+        versions: of sealag and the libraries that computed it; the kernels of `blas` decide the
+            last bits of its numbers.
     """
 
     status: Status
