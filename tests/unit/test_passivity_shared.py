@@ -52,9 +52,11 @@ def test_without_duals_the_instants_themselves_bound_a_motion_from_above():
 
 
 def test_a_worse_candidate_does_not_replace_a_better_one():
-    problem = Problem.of_stiffness(turning(), D)
+    mixed = np.random.default_rng(0).permutation(60)  # many minima: the search goes on
+    problem = Problem.of_stiffness(turning(60)[mixed], D)
     best = solve(problem, share=Motion())
-    one_sided = solve(problem.at(np.array([0])), share=Motion()).multiplier
+    softest = solve(problem, share=Instant()).delay.argmax()
+    one_sided = solve(problem.at(np.array([softest])), share=Motion()).multiplier
     kept = solve(problem, share=Motion(), solver=Primal(best.multiplier, *[one_sided] * 80))
     assert kept.delay == pytest.approx(best.delay, rel=1e-6)
     worse = solve(problem, share=Motion(), solver=Primal(*[one_sided] * 80))
