@@ -80,3 +80,10 @@ def test_a_drop_begins_at_its_height():
     )
     assert high.q[0, 2] - low.q[0, 2] == pytest.approx(0.037, abs=1e-9)
     assert not low.contact_mode[0].any()
+
+
+def test_the_log_has_the_period_that_is_asked_for_or_set(tmp_path):
+    system = with_setting(arm_system(tmp_path), log_period_ms=4.0)
+    for asked, period in ((None, 0.004), (0.01, 0.01)):
+        run = simulate(system, scenario="track", duration=0.04, log_period=asked)
+        np.testing.assert_allclose(np.diff(run.time), period, atol=1e-12)

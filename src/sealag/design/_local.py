@@ -256,6 +256,9 @@ class _Decision:
             known.append(self._at(k, Place.REST, self._rest_of(k)))
         worst = min(known, key=_Known.order)
         unstable = worst.delay == 0.0
+        undecided = [one for one in known if one.delay is None]
+        if undecided and not unstable:  # one place does not speak for the other
+            worst = undecided[0]
         if worst.delay is not None:
             self._found(k, Basis.EXACT, worst.delay, worst.roots)
         if self._best is None or worst.order() < self._best.order():

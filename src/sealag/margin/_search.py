@@ -16,9 +16,9 @@ from sealag.margin._pictures import Picture
 
 _SHRINK = 1.5
 _LEAST = 0.12
-MOST_SAMPLES = 60_000
-"""Samples at most. Ten times fewer leave dense loops with hundreds of crossings open; ten times
-more take an hour for loops that never close."""
+MOST_SAMPLES = 10_000
+"""Samples at most. Robots need up to a few hundred; ten times fewer leave dense loops with hundreds
+of crossings open; ten times more take minutes for loops that never close."""
 
 
 class Piece(NamedTuple):
