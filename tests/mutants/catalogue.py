@@ -18,6 +18,7 @@ TESTS = {
               "tests/unit/test_margin_bad_input.py tests/oracle/test_margin_known_systems.py "
               "tests/property/test_margin_never_exceeded.py",
     "passivity": "tests/unit/test_passivity_bounds.py tests/unit/test_passivity_storage.py "
+                 "tests/unit/test_passivity_motion.py tests/unit/test_passivity_windows.py "
                  "tests/unit/test_passivity_verify.py tests/unit/test_certificate_forgeries.py "
                  "tests/unit/test_certificate_local.py tests/unit/test_certificate_edges.py "
                  "tests/unit/test_certificate_drives.py tests/oracle/test_passivity_multitask.py "
