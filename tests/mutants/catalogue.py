@@ -24,6 +24,8 @@ TESTS = {
                  "tests/unit/test_certificate_drives.py tests/oracle/test_passivity_multitask.py "
                  "tests/oracle/test_passivity_against_sdp.py",
     "design": "tests/unit/test_design_local.py tests/unit/test_design_motors.py "
+              "tests/unit/test_design_thresholds.py tests/unit/test_design_conditions.py "
+              "tests/unit/test_design_withdrawn.py "
               "tests/unit/test_design_cases.py "
               "tests/unit/test_design_questions.py tests/unit/test_design_system.py "
               "tests/unit/test_design_starter.py tests/unit/test_design_drift.py "
