@@ -13,11 +13,9 @@ from sealag.whole_body import Law, MotorAngles
 
 
 def moving(folder, contact_index):
-    """The arm with motor angles fed back, and a motion in which its second joint is held."""
+    """The arm with motor angles fed back, and a motion in which contacts may hold its elbow."""
     system = arm_system(folder)
-    law = Law(
-        tasks=(joint_task(system.robot, 30.0),), stiffness_form="force", signal=MotorAngles()
-    )
+    law = Law(tasks=(joint_task(system.robot, 30.0),), stiffness_form="force", signal=MotorAngles())
     count = len(contact_index)
     t = np.linspace(0.0, 1.0, count)
     motion = Motion(
