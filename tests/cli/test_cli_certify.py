@@ -141,6 +141,19 @@ def test_a_changed_digit_is_shown(tmp_path, cli):
     assert text.endswith("the certificate does not hold\n")
 
 
+def test_the_joint_that_limits_most_is_named_first(tmp_path, cli):
+    out = tmp_path / "c.json"
+    _, text, _ = cli("certify", EXAMPLES / "baxter.toml", "--out", out)
+    (line,) = [line for line in text.splitlines() if line.startswith("limiting joints")]
+    told = {name: float(share[:-1]) for name, share in map(str.split, line[16:].split(", "))}
+    shares = json.loads(out.read_text())["worst"]["direction"]
+    known = {name: 100.0 * share for name, share in shares.items() if share >= 0.01}
+    assert 1 < len(told) == min(3, len(known))
+    assert list(told.values()) == sorted(told.values(), reverse=True)
+    assert next(iter(told)) == max(known, key=known.get)
+    assert told == pytest.approx({name: known[name] for name in told}, abs=0.5)
+
+
 def test_margin_command(cli):
     code, text, _ = cli("margin", EXAMPLES / "baxter.toml", "--json")
     answer = json.loads(text)

@@ -17,14 +17,15 @@ TESTS = {
               "tests/unit/test_margin_embedded_delay.py tests/unit/test_margin_at_most.py "
               "tests/unit/test_margin_bad_input.py tests/oracle/test_margin_known_systems.py "
               "tests/property/test_margin_never_exceeded.py",
-    "passivity": "tests/unit/test_passivity_bounds.py tests/unit/test_passivity_shared.py "
-                 "tests/oracle/test_passivity_solvers.py tests/unit/test_passivity_storage.py "
+    "passivity": "tests/unit/test_passivity_bounds.py tests/unit/test_passivity_storage.py "
+                 "tests/unit/test_passivity_motion.py tests/unit/test_passivity_windows.py "
                  "tests/unit/test_passivity_verify.py tests/unit/test_certificate_forgeries.py "
                  "tests/unit/test_certificate_local.py tests/unit/test_certificate_edges.py "
                  "tests/unit/test_certificate_drives.py tests/oracle/test_passivity_multitask.py "
                  "tests/oracle/test_passivity_against_sdp.py",
     "design": "tests/unit/test_design_local.py tests/unit/test_design_motors.py "
-              "tests/unit/test_design_refusals.py "
+              "tests/unit/test_design_thresholds.py tests/unit/test_design_conditions.py "
+              "tests/unit/test_design_withdrawn.py "
               "tests/unit/test_simulation_scenario_settings.py "
               "tests/unit/test_design_cases.py "
               "tests/unit/test_design_questions.py tests/unit/test_design_system.py "

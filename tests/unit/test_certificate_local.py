@@ -230,6 +230,23 @@ def test_a_slack_crossing_is_not_hidden_by_leaving_it_out():
     assert "stable without delay" in failures(data)
 
 
+def test_a_bound_is_no_margin_where_the_law_answers_to_the_base():
+    """The passive bound of an instant may stand for its margin, unless what is fed back depends on
+    motions that the motors do not determine."""
+    data = made("moving")
+    k = (data["critical"]["instant"] + 7) % data["instants"]
+    data["instant_basis"][k] = "bound"
+    data["instant_margins_s"][k] = data["bounds_s"][k]
+    loop = data["local_loop"]
+    others = [k for k, name in enumerate(loop["states"]) if not name.startswith("theta:")]
+    for share, coupled in ((0.0, False), (1e-8, False), (1e-3, True)):
+        for row in loop["A_1"]:
+            for at in others:
+                row[at] = 0.0
+        loop["A_1"][-1][others[1]] = share * np.abs(loop["A_1"]).max()
+        assert ("margins by bounds" in failures(data)) is coupled
+
+
 def test_files_stay_small():
     assert len(json.dumps(made("baxter"))) < 100_000
     assert len(json.dumps(made("moving"))) < 140_000

@@ -63,3 +63,27 @@ def test_the_log_period_is_what_is_asked_for(tmp_path):
     setting = system.simulation.model_copy(update={"log_period_ms": 50.0})
     stated = sealag.simulate(replace(system, simulation=setting), duration=0.1)
     np.testing.assert_allclose(stated.time, [0.0, 0.05, 0.1], rtol=1e-9)
+
+
+def test_a_balanced_design_without_pushes_gets_a_twentieth_of_its_weight_for_a_tenth(tmp_path):
+    """∫F dx of the last joint's frame between 0.2 s and 0.3 s."""
+    system = held(tmp_path)
+    run = sealag.simulate(system, scenario="balance", duration=0.35)
+    first, last = (int(np.abs(run.time - t).argmin()) for t in (0.2, 0.3))
+    places = [system.robot.frame_placement("joint1", run.q[at])[1][0] for at in (first, last)]
+    given = run.audit.scalar_flows["disturbance"]
+    work = 0.05 * system.robot.weight * (places[1] - places[0])
+    assert work > 1e-4
+    assert given[last] == pytest.approx(work, rel=1e-6)
+    assert given[first] == 0.0
+    assert given[-1] == given[last]
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.035])
+def test_a_design_stands_on_feet_of_the_project_s_radius(radius):
+    system = sealag.load(EXAMPLES / "anymal.toml")
+    setting = system.simulation.model_copy(update={"foot_radius": radius})
+    run = sealag.simulate(replace(system, simulation=setting), scenario="regulate", duration=0.01)
+    for contact in system.contacts:
+        height = system.robot.frame_placement(contact.frame, run.q[0])[1][2]
+        assert height == pytest.approx(radius, abs=1e-9)

@@ -251,6 +251,31 @@ class TestPassivityObserver:
             assert not side.passive
             assert side.joint == f"joint{guilty}"
 
+    @pytest.mark.parametrize("weak", [0, 1])
+    def test_a_motor_too_weak_to_brake_is_named(self, tmp_path, weak):
+        """Both motors run and are told to stop; one cannot, so that its side keeps energy that the
+        port says it has given: −∫(τ_osc − D_θ θ̇)ᵀθ̇ dt grows with its speed."""
+        robot = planar_arm(tmp_path, count=2, mass=1e-3, inertia=1.0, length=1e-3)
+        limit = np.full(2, 1e3)
+        limit[weak] = 0.5
+        springs = actuators(
+            robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=[10.0, 8.0]
+        )
+        speed = np.array([0.9, 0.9])
+        speed[weak] = 1.3
+
+        def side(limit):
+            run = closed_loop(
+                robot, replace(springs, torque_limit=limit),
+                JointPD(np.zeros(2), stiffness=0.0, damping=5.0, motor=True),
+                q=np.zeros(2), theta=np.zeros(2), v=speed, theta_dot=speed, duration=0.05,
+            )  # fmt: skip
+            return run.audit.joint_side
+
+        assert side(np.full(2, 1e3)).passive
+        assert not side(limit).passive
+        assert side(limit).joint == f"joint{weak}"
+
     def test_no_statement_without_storage(self, tmp_path):
         robot = wheel(tmp_path)
         springs = actuators(

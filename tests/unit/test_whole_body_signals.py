@@ -169,6 +169,24 @@ def test_frozen_command_is_the_derivative_of_what_runs(tmp_path, signal, gravity
     assert differ(in_the_end(loop), in_the_end(other.frozen(rest=rest))) > 1e-2
 
 
+@pytest.mark.parametrize("bent", [1e-3, -3e-3])
+def test_the_derivative_is_exact_beside_a_singular_posture(tmp_path, bent):
+    """An arm all but stretched, whose Λ changes within 1e-3 rad: Jᵀ Λ^½ K Λ^½ J at the posture, of
+    which differences of second order leave 1e-6."""
+    robot, gains = arm(tmp_path), np.array([2e-3, 5e-3])
+    task = Task(name="com", kind="com", axes=(0, 2), stiffness=np.diag(gains))
+    law = Law(tasks=(task,), signal=MotorAngles(), gravity="planned")
+    q = np.array([0.4, bent])
+    system = arm_system(tmp_path, robot=robot, law=law, posture=q)
+    J = robot.com_jacobian(q)[[0, 2]]
+    values, V = np.linalg.eigh(J @ np.linalg.inv(robot.mass_matrix(q)) @ J.T)
+    root = V / np.sqrt(values) @ V.T
+    expected = J.T @ root @ np.diag(gains) @ root @ J
+    loop = system.frozen(rest=system.in_posture())
+    found = -loop.C[:, parts(loop)[1]]
+    assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
+
+
 def test_an_empty_tank_moves_with_the_motors(tmp_path):
     """u = 0: x̂ = J* θ, the stiffness of motor angles, and nothing remembered."""
     system = system_of(tmp_path, Tank(energy=0.0), "planned")

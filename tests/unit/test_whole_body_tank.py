@@ -46,8 +46,12 @@ class Posed:
             reference=lambda t: (self.wanted, np.zeros(3)),
         )  # fmt: skip
         self._seen, self._out = Measurement.allocate(nq=3, nv=3, n=3), np.zeros(3)
-        self._controller.reset(0.0, self._seen)
+        self.reset()
         self.tick(0.0, np.zeros(3))
+
+    def reset(self):
+        """Start a run."""
+        self._controller.reset(0.0, self._seen)
 
     def tick(self, period, moved):
         """Move the motors and run one tick."""
@@ -96,6 +100,18 @@ def test_tank_is_never_overdrawn_and_an_empty_one_does_nothing(flow, seed, tmp_p
     assert np.linalg.norm(empty.target) > 1.01 * np.linalg.norm(moved)
     assert empty.energy == 0.0
     np.testing.assert_allclose(empty.x_hat, moved, rtol=0.0, atol=1e-12)
+
+
+def test_a_reset_fills_the_tank_again(tmp_path):
+    """A controller that has run once starts its next run with all of its energy."""
+    rng = np.random.default_rng(3)
+    one = Posed(tmp_path, stiffness(rng), energy=0.7, flow=TankFlow.CORRECTED)
+    for period, moved, one.wanted in ticks(rng, 20):
+        one.tick(period, moved)
+    spent = 0.7 - one.energy
+    assert abs(spent) > 0.05
+    one.reset()
+    assert one.energy == 0.7
 
 
 @pytest.mark.parametrize("flow", list(TankFlow))
