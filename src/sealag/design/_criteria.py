@@ -184,6 +184,7 @@ class Conditions:
         for refused, words in self._refusals(rest, motion):
             if (refused & (bound.delay > 0.0)).any():
                 bound = bound.refused(refused, words)
+        release(self.load, None if motion is None else motion.v)
         return bound
 
     def _refusals(

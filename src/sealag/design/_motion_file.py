@@ -74,13 +74,15 @@ def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] =
     except InputError as error:
         raise MotionError(f"{path}: {error}") from error
     sets, index = _contact_sets(table, contacts)
-    return Motion(
+    motion = Motion(
         time=time,
         q=q,
         v=_velocities(table, robot, q, path=path, store=store),
         contact_sets=sets,
         contact_index=index,
     )
+    release(motion.q, motion.v)
+    return motion
 
 
 def _check_rows(table: dict[str, Array], path: Path) -> None:
@@ -146,7 +148,7 @@ def _column(values: Array, name: str, path: Path) -> Array:
             f"{path}: the column {name} has type {values.dtype} and shape {values.shape}; one real "
             "number a row is needed."
         )
-    return values.astype(float).ravel()
+    return values.astype(float, copy=False).ravel()
 
 
 def _read_npz(file: BinaryIO, path: Path) -> dict[str, Array]:

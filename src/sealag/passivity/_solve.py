@@ -259,7 +259,7 @@ def search(problem: Problem, pointwise: Array, *, tolerance: float, solver: Solv
         solver: where candidates come from.
     """
     count, m, _ = problem.J.shape
-    if not problem.M.any():
+    if not any(part.M.any() for part in problem.parts()):
         small = np.eye(m) / (1.0 + float(norm(problem.J).max()) ** 2)
         factor = factorise(problem, small)
         return Search(factor=factor, delay=np.inf, upper=np.inf, binding=(), status="no stiffness")
