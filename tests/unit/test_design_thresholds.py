@@ -46,6 +46,19 @@ def test_a_tracked_reference_has_the_project_s_amplitude_and_frequency(tmp_path)
     assert abs(moved[-1]) < 0.2 * 0.05
 
 
+def test_a_tracked_reference_feeds_its_own_speed_forward(tmp_path):
+    """Without D_θ θ̇_d the first motor would lag by D ẋ / k, out and back; with it, hardly."""
+    system = held(tmp_path)
+    setting = system.simulation.model_copy(
+        update={"track_amplitude": 0.05, "track_frequency_hz": 0.5}
+    )
+    run = sealag.simulate(replace(system, simulation=setting), scenario="track", duration=2.0)
+    out, back = (run.theta[int(np.abs(run.time - t).argmin()), 0] for t in (0.5, 1.5))
+    speed = 0.5 * 0.05 * 2.0 * np.pi * 0.5
+    lag = 12.0 * speed / 80.0
+    assert abs(back - out) < 0.2 * (2.0 * lag)
+
+
 def test_a_drop_begins_at_the_project_s_height():
     system = sealag.load(EXAMPLES / "anymal.toml")
     setting = system.simulation.model_copy(update={"drop_height": 0.07})
