@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from humanoids2016._claims import Claim, Verdict
+from humanoids2016._parallel import in_parallel
 from humanoids2016._walk import TICK, Walk, WalkCase, simulate_walk, walking_of
 from sealag.design import load
 from sealag.typing import Array
@@ -64,11 +64,10 @@ def figure_5(
         project: Hume with the paper's gains and delays; each process loads it.
         jobs: number of processes.
     """
-    from joblib import Parallel, delayed
-
-    cases = [(K, scale, beta) for K in STIFFNESSES for scale in DAMPING_SCALES for beta in betas]
-    traces: Any = Parallel(n_jobs=jobs)(delayed(_trace)(project, *case) for case in cases)
-    return tuple(traces)
+    cases = [
+        (project, K, scale, beta) for K in STIFFNESSES for scale in DAMPING_SCALES for beta in betas
+    ]
+    return tuple(in_parallel(_trace, cases, jobs=jobs))
 
 
 def _trace(project: str, stiffness: float, scale: float, beta: float) -> TorqueTrace:

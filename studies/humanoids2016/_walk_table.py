@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from humanoids2016._claims import Claim, Verdict
+from humanoids2016._parallel import in_parallel
 from humanoids2016._walk import Walk, WalkCase, at_delay_scale, simulate_walk
 from humanoids2016._walk_errors import SensorNoise
 from sealag.delay import Delays
@@ -99,9 +100,7 @@ def walk_success(
         system = load(project)
         walks = [_summary(simulate_walk(system, case)) for _, case in work]
     else:
-        from joblib import Parallel, delayed
-
-        walks = list(Parallel(n_jobs=jobs)(delayed(_walk)(*item) for item in work))
+        walks = in_parallel(_walk, work, jobs=jobs)
     count = 1 if grounds is None else len(grounds)
     rows = zip(cases, range(0, len(work), count))
     return tuple(WalkRow.of(name, walks[at : at + count]) for name, at in rows)
