@@ -290,12 +290,13 @@ def _answer(case: _Case) -> Answer:
 def _blas() -> str:
     """What the last bits of all numbers depend on: the linear algebra's library, the processor that
     its kernels are for, and its threads."""
-    for found in threadpool_info():
-        if found["user_api"] == "blas":
-            words = (found["internal_api"], found["version"], found.get("architecture"))
-            named = "-".join(str(word) for word in words if word)
-            return f"{named}-{found['num_threads']}threads"
-    return "unknown"
+    kinds = {
+        "-".join(str(part) for part in (lib["internal_api"], lib.get("architecture")) if part)
+        + f"-{lib['num_threads']}threads"
+        for lib in threadpool_info()
+        if lib["user_api"] == "blas"
+    }
+    return "+".join(sorted(kinds)) or "unknown"
 
 
 def _evidence(case: _Case) -> Evidence:

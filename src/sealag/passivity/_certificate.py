@@ -1,7 +1,6 @@
 """The certificate: it checks itself, and is written as JSON."""
 
 import hashlib
-import itertools
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -111,9 +110,9 @@ def content_digest(data: Mapping[str, Any]) -> str:
     """
     others = {key: value for key, value in data["hashes"].items() if key != "content"}
     content, digest = {**data, "hashes": others}, hashlib.sha256()
-    for mark, key in zip(itertools.chain("{", itertools.repeat(",")), sorted(content)):
+    for at, key in enumerate(sorted(content)):
         text = json.dumps(content[key], sort_keys=True, separators=(",", ":"), allow_nan=False)
-        digest.update(f"{mark}{json.dumps(key)}:{text}".encode())
+        digest.update(f"{',' if at else '{'}{json.dumps(key)}:{text}".encode())
     digest.update(b"}")
     return digest.hexdigest()
 
@@ -128,11 +127,11 @@ def write_certificate(certificate: Certificate, path: Path | Draft) -> None:
     Raises:
         FileError: it cannot be written, or is larger than what is read.
     """
-    entries = certificate.to_json_dict().items()
     with written_whole(path) as file:
         size = 0
-        for mark, (key, value) in zip(itertools.chain("{", itertools.repeat(",")), entries):
-            line = f"{mark}\n{json.dumps(key)}: {json.dumps(value, allow_nan=False)}".encode()
+        for key, value in certificate.to_json_dict().items():
+            text = f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}"
+            line = f"{',' if size else '{'}\n{text}".encode()
             size += len(line)
             if size > LARGEST_BYTES:
                 name = path.asked if isinstance(path, Draft) else path
