@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from helpers.levels import Saying
+from sealag.errors import InputError
 from sealag.passivity import Instant, Motion, Problem, Solution, solve
 
 
@@ -74,7 +75,9 @@ def test_what_is_refuted_is_not_taken_for_proven():
     J = np.tile(np.eye(2), (2, 1))
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])
     M = np.hstack([np.eye(2) + turn, np.eye(2) - turn])
-    problem = Problem(J=J, M=M, blocks=(2, 2), A_error=np.zeros(2))
+    problem = Problem(J=J, M=M, blocks=(2, 2))
+    with pytest.raises(InputError, match="A_error has shape"):
+        Problem(J=J, M=M, blocks=(2, 2), A_error=np.zeros(3))
     whole, single = 2.0, np.sqrt(2.0)  # w(A_1 + A_2) = w(2 I), w(A_i) = |1 ± j|
     bound = solve(problem, share=Instant(), solver=Saying())
     assert bound.delay == pytest.approx(1.0 / (2.0 * single), rel=1e-6)

@@ -215,3 +215,15 @@ def test_a_recording_that_fits_needs_no_reserve(tmp_path):
     assert recording.complete
     assert len(recording.signals["/joint_states"].time) == len(time)
     assert os.listdir(tmp_path) == ["run.mcap"]
+
+
+def test_times_are_the_nearest_nanosecond(tmp_path):
+    """1.001 s · 1e9 is 1000999999.9999999: cut off it would be a nanosecond early."""
+    path, time = tmp_path / "run.mcap", np.array([1.001, 1.0020000004, 8.2009999996])
+    with McapRecorder(path=path, joints=JOINTS) as recorder:
+        recorder.write_signal("/energy", ["kinetic_j"], time, values=np.zeros((3, 1)))
+    with open(path, "rb") as file:
+        from mcap.reader import make_reader
+
+        stamps = [message.log_time for _, _, message in make_reader(file).iter_messages()]
+    assert stamps == [1_001_000_000, 1_002_000_000, 8_201_000_000]

@@ -58,6 +58,12 @@ class Problem:
             raise InputError(
                 f"J {self.J.shape}, M {self.M.shape} and blocks {self.blocks} do not fit together."
             )
+        for name in ("A_error", "M_error"):
+            error = getattr(self, name)
+            if error.shape[-1] not in (1, len(self.blocks)):
+                raise InputError(f"{name} has shape {error.shape}; one error a level is needed.")
+            each = np.broadcast_to(error, (*error.shape[:-1], len(self.blocks)))
+            object.__setattr__(self, name, each)
 
     @classmethod
     def of_tasks(
