@@ -60,9 +60,11 @@ class Problem:
             )
         for name in ("A_error", "M_error"):
             error = getattr(self, name)
-            if error.shape[-1] not in (1, len(self.blocks)):
+            if error.shape[-1] == len(self.blocks):
+                continue
+            if error.shape[-1] != 1:
                 raise InputError(f"{name} has shape {error.shape}; one error a level is needed.")
-            each = np.broadcast_to(error, (*error.shape[:-1], len(self.blocks)))
+            each = np.repeat(error, len(self.blocks), axis=-1)
             object.__setattr__(self, name, each)
 
     @classmethod
