@@ -383,6 +383,7 @@ __all__ = [
     "check_output",
     "is_inside",
     "make_folder",
+    "opened",
     "read_whole",
     "write_text",
     "written_whole",

@@ -66,14 +66,7 @@ def made(name: str) -> dict[str, Any]:
 def half_a_step(system: System) -> Motion:
     """Forty instants of Hume's walk."""
     whole = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=2), rate=100.0)
-    part = slice(0, 40)
-    return Motion(
-        time=whole.time[part],
-        q=whole.q[part],
-        v=whole.v[part],
-        contact_sets=whole.contact_sets,
-        contact_index=whole.contact_index[part],
-    )
+    return whole.at(slice(0, 40))
 
 
 def _moving() -> Any:

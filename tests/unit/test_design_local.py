@@ -32,13 +32,7 @@ def second_instant():
 
 def one_instant(motion, k):
     """An instant of a motion as a motion."""
-    return replace(
-        motion,
-        time=motion.time[:1],
-        q=motion.q[k : k + 1],
-        v=motion.v[k : k + 1],
-        contact_index=motion.contact_index[k : k + 1],
-    )
+    return replace(motion.at([k]), time=motion.time[:1])
 
 
 def test_the_second_instant_decides_although_its_bound_is_the_longer():

@@ -94,9 +94,10 @@ def bounds_along(
     """
     system, count, printed = along.system, len(along.motion), kind is Criterion.PUBLISHED
     conditions, whole = Conditions.room(system, count), Joined(count)
-    least, asymmetry = np.inf if published or printed else np.nan, 0.0
+    published = published or printed
+    least, asymmetry = np.inf if published else np.nan, 0.0
     for rows, spaces in along.parts():
-        if published or printed:
+        if published:
             part = published_bounds(spaces, system, solver=solver)
             least = min(least, float(part.delay.min()))
         if not printed:
