@@ -1,5 +1,6 @@
 """Scenes that cannot be simulated end in a sentence; runs that go wrong end in a named outcome."""
 
+import signal
 import numpy as np
 import pytest
 
@@ -279,6 +280,25 @@ class TestNamedEnds:
         assert run.outcome is Outcome.INTERRUPTED
         assert run.time[-1] == pytest.approx(0.1)
         assert np.isfinite(run.q).all()
+
+    @pytest.mark.parametrize("method", ["reset", "tick"])
+    def test_ctrl_c_before_the_first_step_keeps_the_first_instant(self, hume, springs, method):
+        """A run is set up by compiled calls too, inside which nothing may be raised."""
+
+        class Pressed(ConstantTorque):
+            def reset(self, t, measurement):
+                if method == "reset":
+                    signal.raise_signal(signal.SIGINT)
+
+            def tick(self, t, measurement, out):
+                if method == "tick" and t == 0.0:
+                    signal.raise_signal(signal.SIGINT)
+                super().tick(t, measurement, out)
+
+        run = _run(hume, springs, _posture(hume), Pressed(np.zeros(6)))
+        assert run.outcome is Outcome.INTERRUPTED
+        np.testing.assert_array_equal(run.time, [0.0])
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 class TestContact:

@@ -36,10 +36,11 @@ class Interrupt:
         self._asked = True
 
     def check(self) -> None:
-        """Raise what was kept.
+        """Raise what was kept, once.
 
         Raises:
             KeyboardInterrupt: Ctrl-C was pressed.
         """
         if self._asked:
+            self._asked = False
             raise KeyboardInterrupt

@@ -83,14 +83,16 @@ def closed_loop(
         robot, actuators, controller, network or Network.ideal(), clock or Clock(),
         scene or Scene(), seed,
     )  # fmt: skip
-    loop.prepare(
-        _state("q", start["q"], robot.nq),
-        _state("v", start.get("v"), robot.nv),
-        start.get("theta"),
-        start.get("theta_dot"),
-    )
     period = loop.clock.central if loop.clock.log is None else loop.clock.log
-    return loop.run(duration, period, progress)
+    with Interrupt() as interrupt:
+        loop.prepare(
+            _state("q", start["q"], robot.nq),
+            _state("v", start.get("v"), robot.nv),
+            start.get("theta"),
+            start.get("theta_dot"),
+        )
+        outcome, message = loop.run(duration, period, progress, interrupt)
+    return loop.result(outcome, message)
 
 
 def _state(name: str, value: Array | None, size: int) -> Array:
@@ -225,8 +227,12 @@ class _Loop:
 
     # Motion ------------------------------------------------------------------------------------
     def run(
-        self, duration: float, log_period: float, progress: Callable[[float], None] | None
-    ) -> Run:
+        self,
+        duration: float,
+        log_period: float,
+        progress: Callable[[float], None] | None,
+        interrupt: Interrupt,
+    ) -> tuple[Outcome, str]:
         """Simulate and log until the end, whatever ends it; the first instant is always logged."""
         if not (math.isfinite(duration) and duration > 0):
             raise InputError(f"the duration must be a time > 0 s, got {duration}")
@@ -238,8 +244,8 @@ class _Loop:
         self._plan(steps, self.clock.steps_of("log", log_period))
         outcome, message = Outcome.COMPLETED, ""
         try:
-            with Interrupt() as interrupt:
-                self._glide(progress, interrupt)
+            self._glide(progress, interrupt)
+            interrupt.check()
         except PlantStop as stop:
             outcome, message = stop.outcome, stop.message
             if outcome in _MAY_BE_NUMERICAL:
@@ -256,7 +262,7 @@ class _Loop:
             still = self._course_of(self._periods._replace(steps=0))
             closing = self._kernel.Cursor(0.0, 0, len(self._channels.due), self._kernel.CLOSE)
             self.plant.glide(still, closing, math.inf)
-        return self._result(outcome, message)
+        return outcome, message
 
     def _filled(self) -> int:
         """How many instants are logged."""
@@ -358,7 +364,8 @@ class _Loop:
                 )
 
     # Result ------------------------------------------------------------------------------------
-    def _result(self, outcome: Outcome, message: str) -> Run:
+    def result(self, outcome: Outcome, message: str) -> Run:
+        """Return what was logged, audited."""
         robot, around, actuators = self.robot, self.plant.surroundings, self.plant.actuators
         log = self._kernel.Log(*(array[: self._filled()] for array in self._log))
         joints, ways = tuple(robot.joints), self.exchanges
