@@ -227,8 +227,7 @@ MUTANTS = [
     *_of(
         "law", "whole_body/_tank.py",
         ("return self._first > 0.0 and self.rate > 0.0", "return False", "a tank that can pay"),
-        ("self._energy[0], self._started[0] = self._first, 0", "self._started[0] = 0",
-         "a tank that is filled at the start"),
+        ("self._energy[0] = self._first", "pass", "a tank that is filled at the start"),
     ),
     *_of(
         "law", "whole_body/_signal_states.py",

@@ -13,7 +13,7 @@ from sealag.kernels.dynamics import (
     gravity_hessian,
     rigid_body_terms,
 )
-from sealag.kernels.linalg import copy, eliminate, multiply
+from sealag.kernels.linalg import copy, eliminate, multiply, substitute
 from sealag.kernels.operational_space import Space, operational_space, task_torque
 from sealag.kernels.spatial import integrate
 from sealag.kernels.task_error import frame_error, leave_to_higher
@@ -80,7 +80,7 @@ class Newton(NamedTuple):
     slope: Array  # (n, n) ∂ḡ/∂q_j; 0 unless it is fed back
     J: Array  # (m, n) minus the errors' Jacobian
     force: Array  # (m, n) S J
-    square: Array  # (n, n)
+    square: Array  # (n, n) K + ∂l/∂q_j, factored
     step: Array  # (n,)
 
 
@@ -98,21 +98,34 @@ class Control(NamedTuple):
     space: Space
 
 
+class Followed(NamedTuple):
+    """q̄(θ) from tick to tick."""
+
+    sag: Array  # (n,) q̄ − θ of the last tick, rad; of a first guess before
+    theta: Array  # (n,) motor angles there, rad
+    answer: Array  # (n, n) factors of K + ∂l/∂q_j there
+    started: IntArray  # (1,) whether there was a tick
+
+
+class Tank(NamedTuple):
+    """An energy tank's x̂, and what it may cost."""
+
+    position: Array  # (m,) x̂, from the posture's own
+    energy: Array  # (1,) J
+    rate: float  # at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s
+    delay_bound: float  # s, that the tank pays for
+    corrected: bool  # whether the tank pays for u's work on the potential
+
+
 class Signal(NamedTuple):
     """The running signal: where the law is taken, and what is carried from tick to tick."""
 
     kind: int  # MEASURED, STATIC or TANK
-    sag: Array  # (n,) q̄ − θ, where the search for q̄(θ) begins, rad
     iterations: int  # Newton steps towards q̄(θ) at most
     settled: float  # rad; a smaller step is the last
     diverged: float  # rad; a larger step means no solution nearby
-    position: Array  # (m,) x̂, from the posture's own
-    theta: Array  # (n,) motor angles at the tank's last step, rad
-    energy: Array  # (1,) of the tank, J
-    started: IntArray  # (1,) whether x̂ is somewhere
-    rate: float  # at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s
-    delay_bound: float  # s, that the tank pays for
-    corrected: bool  # whether the tank pays for u's work on the potential
+    static: Followed
+    tank: Tank
 
 
 @entry
@@ -135,14 +148,16 @@ def tick(control, signal, period, q, angles, out):
 
 @inner
 def _tick(control, signal, period, q, angles, out):
-    at = control.at
+    at, static = control.at, signal.static
+    if signal.kind != MEASURED and static.started[0]:
+        _foresee(control, static, angles)
     # One evaluation serves all signals: what is inlined once is compiled once.
     settled, steps = False, 0
     while True:
         for i in range(angles.size):
             at.joints[i] = angles[i]
             if signal.kind != MEASURED and not settled:
-                at.joints[i] += signal.sag[i]
+                at.joints[i] += static.sag[i]
         if not evaluate(control, q, at.joints, out):
             return SINGULAR_MASS
         if signal.kind == MEASURED or settled:
@@ -153,7 +168,7 @@ def _tick(control, signal, period, q, angles, out):
             return status
         settled = settled or steps >= signal.iterations
         if settled:
-            _end_search(control, signal, out)
+            _end_search(control, static, out)
             for r in range(at.error.size):
                 at.target[r] = at.wanted[r] - at.error[r]
             # Compensation that is fed back is taken at θ, whose gradient it has.
@@ -161,7 +176,23 @@ def _tick(control, signal, period, q, angles, out):
                 break
     if signal.kind == TANK:
         _follow(control, signal, period, angles, out)
+    if signal.kind != MEASURED:
+        copy(angles, static.theta)
+        copy(control.newton.square, static.answer)
+        static.started[0] = 1
     return EXISTS
+
+
+@inner
+def _foresee(control, static, theta):
+    """Move sag = q̄ − θ as q̄ follows the motors to first order, Δq̄ = (K + ∂l/∂q_j)⁻¹ K Δθ: the
+    search for q̄(θ) then begins so near that one evaluation mostly ends it."""
+    moved = control.newton.step
+    for i in range(theta.size):
+        moved[i] = control.gains.springs[i] * (theta[i] - static.theta[i])
+    substitute(static.answer, moved)
+    for i in range(theta.size):
+        static.sag[i] += moved[i] - (theta[i] - static.theta[i])
 
 
 @inner
@@ -274,7 +305,7 @@ def static_step(J_star, stiffness, springs, torque, sag, newton):
         springs: (n,) K, Nm/rad.
         torque: (n,) l at θ + sag.
         sag: (n,), moved.
-        newton: slope and J are read; force, square and step (n,) δ are written.
+        newton: slope and J are read; force, square (its factors) and step (n,) δ are written.
 
     Returns:
         False if a pivot is not positive: the task is stiffer than the springs.
@@ -290,8 +321,9 @@ def static_step(J_star, stiffness, springs, torque, sag, newton):
     for i in range(n):
         square[i, i] += springs[i]
         step[i] = -springs[i] * sag[i] - torque[i]
-    if not eliminate(square, step, _PIVOT, springs):
+    if not eliminate(square, _PIVOT, springs):
         return False
+    substitute(square, step)
     for i in range(n):
         sag[i] += step[i]
     return True
@@ -312,17 +344,17 @@ def approach_static_state(control, signal, torque):
 
     Args:
         control: the law, evaluated at θ + sag.
-        signal: its sag is moved.
+        signal: the sag of its q̄ is moved.
         torque: (n,) of the law there, Nm.
 
     Returns:
         EXISTS or NO_STATIC_STATE, and whether this was the last step.
     """
-    gains, newton, space = control.gains, control.newton, control.space
+    gains, newton, space, sag = control.gains, control.newton, control.space, signal.static.sag
     if gains.fed_back:
         gravity_slope(control.tree, control.terms, space.joint_from_base, newton)
     _write_error_jacobian(control)
-    exists = static_step(space.J_star, space.stiffness, gains.springs, torque, signal.sag, newton)
+    exists = static_step(space.J_star, space.stiffness, gains.springs, torque, sag, newton)
     size = 0.0
     for i in range(newton.step.size):
         size = max(size, abs(newton.step[i]))
@@ -332,12 +364,12 @@ def approach_static_state(control, signal, torque):
 
 
 @inner
-def _end_search(control, signal, out):
+def _end_search(control, static, out):
     """Write torque and error at q̄: the springs carry the law there, l(q̄) = K (θ − q̄) = −K sag, so
     that the last step needs no new evaluation."""
     at, newton = control.at, control.newton
     for i in range(out.size):
-        out[i] = -control.gains.springs[i] * signal.sag[i]
+        out[i] = -control.gains.springs[i] * static.sag[i]
     for r in range(at.error.size):
         for i in range(out.size):
             at.error[r] -= newton.J[r, i] * newton.step[i]
@@ -378,17 +410,15 @@ def step_tank(tank, period, at, stiffness):
 @inner
 def _follow(control, signal, period, theta, out):
     """Let x̂ follow its target as far as the tank pays, and write the law's torque at x̂."""
-    at, J_star = control.at, control.space.J_star
-    if signal.started[0]:
+    at, J_star, static, tank = control.at, control.space.J_star, signal.static, signal.tank
+    if static.started[0]:
         at.moved[:] = 0.0
         for r in range(at.moved.size):
             for i in range(theta.size):
-                at.moved[r] += J_star[r, i] * (theta[i] - signal.theta[i])
-        step_tank(signal, period, at, control.space.stiffness)
+                at.moved[r] += J_star[r, i] * (theta[i] - static.theta[i])
+        step_tank(tank, period, at, control.space.stiffness)
     else:
-        copy(at.target, signal.position)
-        signal.started[0] = 1
-    copy(theta, signal.theta)
+        copy(at.target, tank.position)
     for r in range(at.error.size):
-        at.error[r] = at.wanted[r] - signal.position[r]
+        at.error[r] = at.wanted[r] - tank.position[r]
     _write_torque(control, out)

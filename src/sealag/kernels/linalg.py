@@ -317,29 +317,36 @@ def least_squares(A, r, damping, x, scratch):
 
 
 @inner
-def eliminate(A, x, share, scale):
-    """x ← A⁻¹ x in place by elimination without pivoting; A (n, n) is overwritten.
+def eliminate(A, share, scale):
+    """A ← its factors L and U without pivoting; L's diagonal of ones is not written.
 
     Args:
-        A: (n, n) whose pivots are positive if the question has an answer.
-        x: (n,).
+        A: (n, n) whose pivots are positive if the question has an answer, overwritten.
         share: of its scale (n,) that each pivot must exceed.
         scale: (n,).
 
     Returns:
         False if a pivot does not.
     """
-    n = x.size
+    n = scale.size
     for p in range(n):
         if not A[p, p] > share * scale[p]:
             return False
         for i in range(p + 1, n):
-            factor = A[i, p] / A[p, p]
-            x[i] -= factor * x[p]
+            A[i, p] /= A[p, p]
             for j in range(p + 1, n):
-                A[i, j] -= factor * A[p, j]
+                A[i, j] -= A[i, p] * A[p, j]
+    return True
+
+
+@inner
+def substitute(A, x):
+    """x (n,) ← (L U)⁻¹ x in place, with the factors (n, n) that `eliminate` writes."""
+    n = x.size
+    for i in range(n):
+        for j in range(i):
+            x[i] -= A[i, j] * x[j]
     for i in range(n - 1, -1, -1):
         for j in range(i + 1, n):
             x[i] -= A[i, j] * x[j]
         x[i] /= A[i, i]
-    return True

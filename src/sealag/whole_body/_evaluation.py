@@ -21,7 +21,7 @@ from sealag.whole_body._tasks import (
 )
 
 if TYPE_CHECKING:
-    from sealag.kernels.control_law import Control, Gains, Tasks
+    from sealag.kernels.control_law import Control, Followed, Gains, Tasks
 
 SETTLED = 1e-12
 """rad: a smaller Newton step of q̄(θ) is the last. Ten times larger shows in differences of the
@@ -177,31 +177,39 @@ class LawEvaluation:
             raise self._without_static_state(float(np.abs(self._newton.step).max()))
 
     def running(
-        self, *, sag: Array | None = None, iterations: int = 1, tank: EnergyTank | None = None
+        self,
+        *,
+        static: "Followed | None" = None,
+        iterations: int = 1,
+        tank: EnergyTank | None = None,
     ) -> Any:
         """Return a running signal as kernels take it: measured angles, q̄(θ) or x̂ of a tank.
 
         Args:
-            sag: (n,) q̄ − θ, a first guess that is moved, rad; None for measured angles.
+            static: q̄(θ) from tick to tick, moved; None for measured angles.
             iterations: Newton steps towards q̄(θ) at most.
             tank: lets x̂ follow x(q̄(θ)).
         """
-        kernel, n = self._kernel, self.robot.n
-        kind = kernel.MEASURED if sag is None else kernel.STATIC
+        kernel = self._kernel
+        kind = kernel.MEASURED if static is None else kernel.STATIC
         if tank is None:
             tank = EnergyTank(
-                rows=0, joints=0, energy=0.0, rate=0.0, delay_bound=0.0, flow=TankFlow.CORRECTED
+                rows=0, energy=0.0, rate=0.0, delay_bound=0.0, flow=TankFlow.CORRECTED
             )
         else:
             kind = kernel.TANK
-        position, theta, energy, started = tank.memory
         signal = kernel.Signal(
-            kind=kind, sag=np.zeros(n) if sag is None else sag, iterations=iterations,
-            settled=SETTLED, diverged=DIVERGED, position=position, theta=theta, energy=energy,
-            started=started, rate=float(tank.rate), delay_bound=float(tank.delay_bound),
-            corrected=tank.flow is TankFlow.CORRECTED,
+            kind=kind, iterations=iterations, settled=SETTLED, diverged=DIVERGED,
+            static=static or self.followed(np.zeros(self.robot.n)), tank=tank.memory,
         )  # fmt: skip
         return keep(signal)
+
+    def followed(self, sag: Array) -> "Followed":
+        """Return memory of q̄(θ) from tick to tick, with a first guess of its sag (n,), live."""
+        n = self.robot.n
+        return self._kernel.Followed(
+            sag=sag, theta=np.zeros(n), answer=np.zeros((n, n)), started=np.zeros(1, np.int64)
+        )
 
     def settled(self, evaluate: Callable[[], None], away: Callable[[], Array]) -> None:
         """Evaluate again until overline(UN_s) is that of the configuration evaluated.
@@ -237,7 +245,9 @@ class LawEvaluation:
             ContractionError: q̄(θ) does not exist, or is not found.
             RobotError: the mass matrix is not positive definite.
         """
-        self.tick(self.running(sag=sag, iterations=iterations), 0.0, q, theta, out)
+        self.tick(
+            self.running(static=self.followed(sag), iterations=iterations), 0.0, q, theta, out
+        )
 
     def _moved(self) -> Array:
         """Minus the errors' Jacobian (m, n) by joint angles, where the law was last evaluated."""

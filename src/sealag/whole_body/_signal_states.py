@@ -220,12 +220,13 @@ class StaticState:
     def __init__(
         self, law: "LawEvaluation", iterations: int, tank: EnergyTank | None = None
     ) -> None:
-        self._law, self._sag = law, np.zeros(law.robot.n)
-        self._running = law.running(sag=self._sag, iterations=iterations, tank=tank)
+        self._law, self.followed = law, law.followed(np.zeros(law.robot.n))
+        self._running = law.running(static=self.followed, iterations=iterations, tank=tank)
 
     def reset(self, t: float, measurement: Measurement) -> None:
         """Start q̄(θ) at the measured joint angles."""
-        self._sag[:] = measurement.q_joint - measurement.theta
+        self.followed.sag[:] = measurement.q_joint - measurement.theta
+        self.followed.started[0] = 0
         self._law.follow(measurement.q)
 
     def command(self, t: float, measurement: Measurement, out: Array) -> None:
@@ -238,7 +239,7 @@ class StaticState:
 
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command at the settled q̄: V_3 at q̄ less ½ lᵀ K⁻¹ l."""
-        sag = self._sag.copy()
+        sag = self.followed.sag.copy()
         self._law.static(measurement.q, measurement.theta, sag, _SETTLE, out)
         energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
         energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
@@ -274,7 +275,7 @@ class TankState:
         return self._tank.energy
 
     def reset(self, t: float, measurement: Measurement) -> None:
-        """Fill the tank and forget x̂."""
+        """Fill the tank and forget x̂ and q̄."""
         self._tank.reset()
         self._last = t
         self._static.reset(t, measurement)
@@ -291,11 +292,11 @@ class TankState:
 
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command with x̂ carried on by J* from the last measured θ to the true one."""
-        law, tank = self._law, self._tank
+        law, tank, static = self._law, self._tank, self._static.followed
         energy, _ = self._static.present(measurement, out)
         self._matrices(measurement.q, measurement.theta)
-        if tank.started:
-            carried = law.space.J_star @ (measurement.theta - tank.theta)
+        if static.started[0]:
+            carried = law.space.J_star @ (measurement.theta - static.theta)
             law.error[:] = law.wanted - tank.position - carried
         law.torque(out)
         energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy

@@ -114,10 +114,12 @@ class StaticJoint(Signal):
     """x(q̄(θ)) of Eqs. (15)-(17), q̄ the joint angles at which the springs carry the law.
 
     Attributes:
-        iterations: Newton iterations a tick at most, warm-started.
+        iterations: Newton steps towards q̄(θ) a tick at most, from where q̄ follows the motors to
+            first order. One leaves 2e-6 rad where all joints of ANYmal move by 2 rad/s; each more
+            evaluates the law once more.
     """
 
-    iterations: int = 2
+    iterations: int = 1
     name: ClassVar[str] = "static_joint"
     rests_at_posture: ClassVar[bool] = True
 
@@ -167,13 +169,13 @@ class Tank(Signal):
         energy: at the start, J.
         rate: at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s.
         flow: what the tank pays for.
-        iterations: Newton iterations a tick at most for q̄(θ).
+        iterations: Newton steps towards q̄(θ) a tick at most, as `StaticJoint` counts them.
     """
 
     energy: float = 1.0
     rate: float = 5.0
     flow: TankFlow = TankFlow.CORRECTED
-    iterations: int = 2
+    iterations: int = 1
     name: ClassVar[str] = "static_joint_tank"
 
     def __post_init__(self) -> None:
@@ -202,7 +204,6 @@ class Tank(Signal):
     def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
         tank = EnergyTank(
             rows=law.rows,
-            joints=law.robot.n,
             energy=self.energy,
             rate=self.rate,
             delay_bound=delay_bound,

@@ -1,10 +1,12 @@
 """The energy tank, Eqs. (18)-(22): a task position x̂ whose moves are paid for."""
 
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sealag.typing import Array, IntArray
+if TYPE_CHECKING:
+    from sealag.kernels.control_law import Tank
 
 
 class TankFlow(StrEnum):
@@ -36,28 +38,29 @@ class EnergyTank:
     """
 
     def __init__(
-        self, *, rows: int, joints: int, energy: float, rate: float, delay_bound: float,
-        flow: TankFlow,
-    ) -> None:  # fmt: skip
+        self, *, rows: int, energy: float, rate: float, delay_bound: float, flow: TankFlow
+    ) -> None:
         """Fill a tank.
 
         Args:
             rows: number of task rows m.
-            joints: number of joints n.
             energy: J at the start.
             rate: at which x̂ follows x(q̄(θ)) while the tank can pay, 1/s.
             delay_bound: d̄, s.
             flow: what the tank pays for.
         """
         self.rate, self.delay_bound, self.flow, self._first = rate, delay_bound, flow, energy
-        self.position, self.theta = np.zeros(rows), np.zeros(joints)
-        self._energy, self._started = np.full(1, energy), np.zeros(1, np.int64)
+        self.position, self._energy = np.zeros(rows), np.full(1, energy)
 
     @property
-    def memory(self) -> tuple[Array, Array, Array, IntArray]:
-        """x̂ (m,), motor angles at the last step (n,), energy (1,), and whether x̂ is somewhere
-        (1,); live."""
-        return self.position, self.theta, self._energy, self._started
+    def memory(self) -> "Tank":
+        """The tank as kernels take it; its arrays are live."""
+        from sealag.kernels.control_law import Tank
+
+        return Tank(
+            position=self.position, energy=self._energy, rate=float(self.rate),
+            delay_bound=float(self.delay_bound), corrected=self.flow is TankFlow.CORRECTED,
+        )  # fmt: skip
 
     @property
     def can_pay(self) -> bool:
@@ -69,11 +72,6 @@ class EnergyTank:
         """Energy left, J, never below 0."""
         return float(self._energy[0])
 
-    @property
-    def started(self) -> bool:
-        """Whether x̂ is somewhere."""
-        return bool(self._started[0])
-
     def reset(self) -> None:
-        """Fill the tank and forget x̂."""
-        self._energy[0], self._started[0] = self._first, 0
+        """Fill the tank."""
+        self._energy[0] = self._first
