@@ -1,0 +1,154 @@
+"""A design's delays as whole steps of MuJoCo, and what MuJoCo cannot represent of them."""
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+from sealag.delay import Delays, Link
+from sealag.errors import InputError
+from sealag.units import in_ms
+
+_TICKS = 10**12
+"""Ticks a second, in which steps and delays are compared: picoseconds. A thousand times coarser
+takes 1/3 ms, written with nine digits, for a multiple of 1 ns; a hundred times finer is beyond the
+rounding of 5 s."""
+
+LEAST_STEP = 1e-6
+"""s; as short as simulation.physics_step_ms may be. Shorter only if delays share no decimal step."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepCounts:
+    """Delays and control period in steps of the simulation.
+
+    Attributes:
+        step: the time step, s.
+        measurement: steps by which sensors are late, the way up.
+        command: steps by which actuators are late, both ways down.
+        tick: steps between two commands of the central controller, which holds each.
+    """
+
+    step: float
+    measurement: int
+    command: int
+    tick: int
+
+    @classmethod
+    def of(cls, delays: Delays, *, longest: float, step: float | None = None) -> Self:
+        """Count the steps of constant delays.
+
+        Without an embedded period a packet is taken on when it arrives. With one, each hop ends
+        at the receiver's next look: its delay is rounded up to a multiple of the period.
+
+        Args:
+            delays: of the design, with the period of a controller that runs.
+            longest: step that springs and motors allow, s.
+            step: the step asked for, s; the longest decimal one that divides all if None.
+
+        Raises:
+            InputError: a delay varies or packets are lost, the step divides a delay or a period
+                not, or only a step shorter than LEAST_STEP would.
+        """
+        up, down, drive = (
+            _constant(name, link)
+            for name, link in (
+                ("central_up", delays.central.up),
+                ("central_down", delays.central.down),
+                ("embedded_down", delays.embedded.down),
+            )
+        )
+        tick, look = _ticks(delays.sample_time), _ticks(delays.embedded_period)
+        if look:
+            up, down, drive = (math.ceil(hop / look) * look for hop in (up, down, drive))
+        parts = {
+            "delay of the measurement": up,
+            "delay of the command": down + drive,
+            "controller's period": tick,
+        }
+        common = math.gcd(*parts.values())
+        count = _decimal(math.ceil(common / _TICKS / min(longest, step or longest) - 1e-9))
+        fits = common / _TICKS / count
+        if step is not None:
+            _require_multiples(parts, step, fits, longest)
+            fits = step
+        elif fits < LEAST_STEP:
+            said = ", ".join(f"{name} {in_ms(part / _TICKS)}" for name, part in parts.items())
+            raise InputError(
+                f"No step of {in_ms(LEAST_STEP)} or more divides all of {said}; round them."
+            )
+        steps = (round(part / _TICKS / fits) for part in parts.values())
+        measurement, command, period = steps
+        return cls(step=fits, measurement=measurement, command=command, tick=period)
+
+    @property
+    def measurement_delay(self) -> float:
+        """Delay of the sensors, s."""
+        return self.measurement * self.step
+
+    @property
+    def command_delay(self) -> float:
+        """Delay of the actuators, s."""
+        return self.command * self.step
+
+    @property
+    def hold(self) -> float:
+        """How long a command is held, s."""
+        return self.tick * self.step
+
+    @property
+    def total(self) -> float:
+        """Largest age of the measurement behind a command at work, s."""
+        return (self.measurement + self.command + self.tick) * self.step
+
+
+def _ticks(time: float) -> int:
+    return round(time * _TICKS)
+
+
+def _constant(name: str, link: Link) -> int:
+    """A link's delay in ticks, if every packet is equally late and none is lost."""
+    if link.constant:
+        return _ticks(link.delay.upper_bound)
+    late = link.delay.upper_bound + link.jitter
+    what = f"varies between {in_ms(link.delay.lower_bound)} and {in_ms(late)}"
+    if link.spread == 0.0:
+        what = f"loses packets, {link.loss:g} of all"
+    raise InputError(
+        f"The connection {name} {what}; a delay in a MuJoCo file is one number: give the worst "
+        f'case as {{ kind = "constant", value_ms = {late * 1e3:.9g} }}, or sealag simulate runs '
+        "the design as it is."
+    )
+
+
+def _require_multiples(parts: dict[str, int], step: float, fits: float, longest: float) -> None:
+    """Refuse a step that springs do not allow, or that does not divide a delay or period."""
+    remedy = f"{in_ms(fits)} would do"
+    if fits < LEAST_STEP:
+        remedy = "no step of 1 us or more would do: round the delays"
+    if not step > 0.0 or not math.isfinite(step):
+        raise InputError(f"The step is {in_ms(step)}; a positive one is needed.")
+    if step > longest * (1.0 + 1e-9):
+        raise InputError(
+            f"The step of {in_ms(step)} is too long for the design's springs, which allow "
+            f"{in_ms(longest)}; {remedy}."
+        )
+    for name, part in parts.items():
+        whole = _ticks(step)
+        if not whole or part % whole:
+            rounded = math.ceil(part / max(whole, 1)) * max(whole, 1) / _TICKS
+            raise InputError(
+                f"The {name}, {in_ms(part / _TICKS)}, is no multiple of the step {in_ms(step)}: "
+                f"MuJoCo would make it {in_ms(rounded)}; {remedy}."
+            )
+
+
+def _decimal(count: int) -> int:
+    """The least number from a count on that divides a power of ten, so that steps stay decimal."""
+    while True:
+        rest = count
+        for factor in (2, 5):
+            while rest % factor == 0:
+                rest //= factor
+        if rest == 1:
+            return count
+        count += 1
