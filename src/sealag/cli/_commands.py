@@ -180,6 +180,7 @@ def margin_project(
         return
     show(f"{'local margin':26} {time_text(found.delay_s)}")
     show(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
+    show(f"{'jitter margin':26} {time_text(found.jitter_s)}")
     if found.frequency_rad_s is not None:
         show(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
     show(f"{'unstable roots':26} {found.unstable_modes} without delay")
