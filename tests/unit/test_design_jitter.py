@@ -80,10 +80,22 @@ def test_a_drive_with_a_bandwidth_has_one_too():
     assert found.jitter_s < found.delay_s
 
 
-def test_the_loop_s_own_matrices_give_the_same_number():
+def test_a_law_that_sags_has_the_smaller_of_posture_and_rest():
     system = sealag.load(EXAMPLES / "anymal.toml")
-    system = replace(system, law=replace(system.law, signal=MotorAngles()))
+    system = replace(system, law=replace(system.law, signal=MotorAngles(), gravity="none"))
     motion = system.still()
-    loop = system.frozen(motion, 0, rest=system.in_posture(motion, 0))
-    alone = jitter_margin(loop.A_0, loop.B, loop.C).delay
-    assert local_margins(system).jitter_s <= alone * (1.0 + 1e-9)
+    loops = [
+        system.frozen(motion, 0, rest=rest)
+        for rest in (system.in_posture(motion, 0), system.rest(motion, 0))
+    ]
+    alone = [jitter_margin(loop.A_0, loop.B, loop.C).delay for loop in loops]
+    assert max(alone) > 1.0001 * min(alone)
+    assert local_margins(system).jitter_s == pytest.approx(min(alone), rel=1e-7)
+
+
+def test_late_torque_feedback_costs():
+    system = sealag.load(EXAMPLES / "anymal.toml")
+    late = replace(system, delays=replace(system.delays, delayed_torque_feedback=True))
+    found, ideal = local_margins(late), local_margins(system)
+    assert 0.0 < found.jitter_s < 0.999 * ideal.jitter_s
+    assert found.jitter_s < found.delay_s

@@ -5,24 +5,20 @@ from collections.abc import Iterator
 import numpy as np
 
 from sealag.design._along import Along
-from sealag.design._local import Local
+from sealag.design._local import MOST_EXACT, Local
 from sealag.errors import SolverError
 from sealag.margin import jitter_margin
-from sealag.passivity import Place
+from sealag.passivity import Basis, Place
 from sealag.typing import Array
 from sealag.whole_body import FrozenLoop
-
-_MOST = 200
-"""Instants whose jitter margin is computed; the passive bound decides the others. Ten times more
-take a minute on a walk, and gain the few percent by which both differ."""
 
 
 def jitter_along(along: Along, bounds: Array, local: Local) -> float | None:
     """Largest delay at which every instant is stable however the delay varies below it, s.
 
-    What is passive at a delay is so however it varies: an instant that is stable without delay
+    What is passive at a delay is so however it varies: an instant in a minimum of its potential
     tolerates at least its passive bound. The jitter margin (docs/theory section 7.4) is computed
-    where that bound lies below the smallest answer so far.
+    at all other instants, and where that bound lies below the smallest answer so far.
 
     Args:
         along: the design and its motion.
@@ -30,22 +26,23 @@ def jitter_along(along: Along, bounds: Array, local: Local) -> float | None:
         local: stability over the same motion.
 
     Returns:
-        The delay; 0 if an instant is unstable without delay, None if that is not known or the
-        answer of an instant is left open.
+        The delay; 0 if an instant is unstable without delay, None if that is not known, the answer
+        of an instant is left open, or too many would have to be computed.
     """
     if not local.stable:
         return None if local.stable is None else 0.0
+    minimum = (local.basis == Basis.BOUND) | (local.basis == Basis.SEARCHED)
+    covered = np.where(minimum, bounds, 0.0)
     least = np.inf
-    for turn, k in enumerate(np.argsort(bounds, kind="stable").tolist()):
-        if bounds[k] >= least:
+    for turn, k in enumerate(np.argsort(covered, kind="stable").tolist()):
+        if covered[k] >= least:
             break
-        if turn == _MOST:
-            return float(bounds[k]) or None
+        if turn == MOST_EXACT:
+            return float(covered[k]) or None
         try:
-            found = min(_margin(loop) for loop in _loops(along, k, local))
+            least = min(least, *(_margin(loop) for loop in _loops(along, k, local)))
         except SolverError:
             return None
-        least = min(least, max(found, float(bounds[k])))
     return float(least)
 
 
