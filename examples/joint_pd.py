@@ -1,7 +1,7 @@
 """Three delays of a joint-PD quadruped: Unitree Go2 on four feet, gains and drives as assumed here.
 
 The controller is any object that ticks; `sealag.freeze` differentiates it as it runs. K_d computed
-in the controller is late, as K_p is, and no passive bound exists; computed in the drives it has one.
+in the controller is late like K_p, and no passive bound exists; computed in the drives it has one.
 """
 
 import numpy as np
