@@ -17,6 +17,7 @@ TESTS = {
     "margin": "tests/unit/test_margin_delay_margin.py tests/unit/test_margin_slow_crossings.py "
               "tests/unit/test_margin_embedded_delay.py tests/unit/test_margin_at_most.py "
               "tests/unit/test_margin_bad_input.py tests/unit/test_margin_jitter.py "
+              "tests/unit/test_margin_sampled.py "
               "tests/oracle/test_margin_known_systems.py "
               "tests/property/test_margin_never_exceeded.py",
     "passivity": "tests/unit/test_passivity_bounds.py tests/unit/test_passivity_storage.py "
@@ -272,8 +273,8 @@ MUTANTS = [
         ("return _System(self.A, left, right @ self.A, right @ left)",
          "return _System(self.A, left, right @ self.A, 0.0 * (right @ left))",
          "a command that feeds back rates"),
-        ("broken = _Broken.of(loop, before, after)",
-         "broken = _Broken.of(loop, before, 0.5 * after)",
+        ("return loop, Broken.of(loop, before, after)",
+         "return loop, Broken.of(loop, before, 0.5 * after)",
          "what is late"),
         ("low = high = float(np.linalg.norm(system.D, 2))", "low = high = 1e-9",
          "a peak above all roots"),
@@ -287,9 +288,26 @@ MUTANTS = [
          "roots without delay"),
     ),
     *_of(
+        "margin", "margin/_sampled.py",
+        ("(waiting + 1, move @ old)]", "(waiting, move @ old)]",
+         "the part of a period that waits longer"),
+        ("(waiting + 1, move @ old)]", "(waiting + 1, old)]",
+         "what the plant does after an old command"),
+        ("proven = max(0.0, varying.delay - period)", "proven = varying.delay",
+         "a hold that costs nothing"),
+        ("low, high = (middle, high) if held.stable(middle) else (low, middle)", "high = middle",
+         "the last step"),
+    ),
+    *_of(
+        "design", "design/_rates.py",
+        ("way = replace(system.delays, sample_time=period).d_1 - period",
+         "way = replace(system.delays, sample_time=period).d_1", "the hold counted twice"),
+        ("stable = way <= margin.delay", "stable = True", "a rate that is too slow"),
+    ),
+    *_of(
         "design", "design/_jitter.py",
-        ("least = min(least, *(_margin(loop) for loop in _loops(along, k, local)))",
-         "least = min(least, max(_margin(loop) for loop in _loops(along, k, local)))",
+        ("least = min(least, *(_margin(loop) for loop in loops_at(along, k, local)))",
+         "least = min(least, max(_margin(loop) for loop in loops_at(along, k, local)))",
          "the worse of posture and rest"),
         ("if covered[k] >= least:\n            break", "break", "every instant but the first"),
         ("return None if local.stable is None else 0.0", "return None",

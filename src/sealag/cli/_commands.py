@@ -160,9 +160,19 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
 
 
 def margin_project(
-    project: str, motion: Path | None, *, horizon_ms: float | None, as_json: bool
+    project: str,
+    motion: Path | None,
+    *,
+    horizon_ms: float | None,
+    rate_sweep: bool,
+    as_json: bool,
 ) -> None:
     """Show the exact local margin at every instant, or at a sample of a long motion."""
+    if rate_sweep:
+        if motion is not None or horizon_ms is not None:
+            raise InputError("--rate-sweep is of the project's posture: leave out the other.")
+        _sweep_rates(project, as_json=as_json)
+        return
     if horizon_ms is not None and not 0.0 < horizon_ms <= LONGEST_HORIZON_MS:
         raise InputError(
             f"--horizon-ms is {horizon_ms:g}; it must be more than 0 and at most "
@@ -190,6 +200,29 @@ def margin_project(
     show(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
     for low, high, count in found.intervals:
         show(f"{time_text(low):>14} to {time_text(high):14} {count} unstable roots")
+
+
+def _sweep_rates(project: str, *, as_json: bool) -> None:
+    """Show what each sample rate tolerates."""
+    system = design.load(project)
+    compile_kernels()
+    with _busy("lifting sampled loops"):
+        rates = design.rate_sweep(system)
+    if as_json:
+        show_json({"rates": [rate.summary() for rate in rates]})
+        return
+    show("rate          largest delay   proven          the design's, without the hold")
+    for rate in rates:
+        largest = "not lifted" if rate.margin.delay is None else time_text(rate.margin.delay)
+        verdict = {True: "stable", False: "unstable", None: "open"}[rate.stable]
+        show(
+            f"{rate.rate_hz:7.1f} Hz    {largest:15} {time_text(rate.margin.proven):15} "
+            f"{time_text(rate.way_s)}, {verdict}"
+        )
+    lost = [f"{rate.rate_hz:g}" for rate in rates if rate.stable is False]
+    kept = [f"{rate.rate_hz:g}" for rate in rates if rate.stable]
+    parts = ((lost, "unstable"), (kept, "stable"))
+    show("; ".join(f"{', '.join(some)} Hz: {word}" for some, word in parts if some))
 
 
 def verify_certificate(

@@ -40,7 +40,7 @@ def jitter_along(along: Along, bounds: Array, local: Local) -> float | None:
         if turn == MOST_EXACT:
             return float(covered[k]) or None
         try:
-            least = min(least, *(_margin(loop) for loop in _loops(along, k, local)))
+            least = min(least, *(_margin(loop) for loop in loops_at(along, k, local)))
         except SolverError:
             return None
     return float(least)
@@ -57,7 +57,7 @@ def _margin(loop: FrozenLoop) -> float:
     ).delay
 
 
-def _loops(along: Along, k: int, local: Local) -> Iterator[FrozenLoop]:
+def loops_at(along: Along, k: int, local: Local) -> Iterator[FrozenLoop]:
     """The loops of an instant: in its posture and, where the law sags, where it rests."""
     system, motion = along.system, along.motion
     posture = system.in_posture(motion, k)

@@ -4,11 +4,15 @@ for one that varies."""
 from sealag.margin._jitter import jitter_margin
 from sealag.margin._margin import DelayMargin, Interval, delay_margin
 from sealag.margin._roots import rightmost_roots
+from sealag.margin._sampled import SampledMargin, sampled_margin, sampled_radius
 
 __all__ = [
     "DelayMargin",
     "Interval",
+    "SampledMargin",
     "delay_margin",
     "jitter_margin",
     "rightmost_roots",
+    "sampled_margin",
+    "sampled_radius",
 ]

@@ -93,6 +93,42 @@ def jitter_margin(
         InputError: matrices do not fit or are not finite real numbers, or a time is negative.
         SolverError: a matrix moves a symmetry, or rounding leaves the norm open.
     """
+    loop, broken = broken_at(
+        A_0, B, C, A_e=A_e, embedded_delay=embedded_delay, symmetries=symmetries
+    )
+    unstable = roots_at_once(loop.A_0 + loop.A_1 + loop.A_e)[0] if len(loop.A_0) else 0
+    found = _Bound(0.0, 0.0, math.nan)
+    if not unstable:
+        found = _bound(broken, loop.embedded_delay)
+    return JitterMargin(
+        delay=found.delay, upper=found.upper, frequency=found.frequency, unstable_roots=unstable,
+        neutral=loop.neutral,
+    )  # fmt: skip
+
+
+def broken_at(
+    A_0: ArrayLike,
+    B: ArrayLike,
+    C: ArrayLike,
+    *,
+    A_e: ArrayLike | None = None,
+    embedded_delay: float = 0.0,
+    symmetries: ArrayLike | None = None,
+) -> "tuple[Loop, Broken]":
+    """Check the matrices of a loop, take its symmetries out, and break it where it is late.
+
+    Args:
+        A_0: (n, n) undelayed part.
+        B: (n, m) what the command does.
+        C: (m, n) the command of a state.
+        A_e: (n, n) part with the embedded delay; None for none.
+        embedded_delay: that delay, s.
+        symmetries: (n, s) columns along which nothing acts.
+
+    Raises:
+        InputError: a matrix does not fit.
+        SolverError: a matrix moves a symmetry.
+    """
     before, after = (
         real_numbers(name, value, what="a matrix of real numbers")
         for name, value in (("B", B), ("C", C))
@@ -106,15 +142,7 @@ def jitter_margin(
     loop = prepare(
         A_0, before @ after, A_e=A_e, embedded_delay=embedded_delay, symmetries=symmetries
     )
-    unstable = roots_at_once(loop.A_0 + loop.A_1 + loop.A_e)[0] if len(loop.A_0) else 0
-    broken = _Broken.of(loop, before, after)
-    found = _Bound(0.0, 0.0, math.nan)
-    if not unstable:
-        found = _bound(broken, loop.embedded_delay)
-    return JitterMargin(
-        delay=found.delay, upper=found.upper, frequency=found.frequency, unstable_roots=unstable,
-        neutral=loop.neutral,
-    )  # fmt: skip
+    return loop, Broken.of(loop, before, after)
 
 
 class _Bound(NamedTuple):
@@ -156,7 +184,7 @@ class _System(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Broken:
+class Broken:
     """A loop without delay, broken where signals are late: the command's first, then the drives'.
 
     Attributes:
@@ -198,7 +226,7 @@ def _halves(matrix: Array) -> tuple[Array, Array]:
     return U[:, :rank] * root, root[:, None] * V[:rank]
 
 
-def _bound(broken: _Broken, embedded_delay: float) -> _Bound:
+def _bound(broken: Broken, embedded_delay: float) -> _Bound:
     """The largest d that is proven."""
     r, late = len(broken.right), broken.late
     if not late:
@@ -218,7 +246,7 @@ def _bound(broken: _Broken, embedded_delay: float) -> _Bound:
     return _Bound(delay, max(1.0 / radius if radius else math.inf, delay), frequency)
 
 
-def _with_drives(broken: _Broken, e: float) -> tuple[float, float]:
+def _with_drives(broken: Broken, e: float) -> tuple[float, float]:
     """The largest d beside late torque feedback, over the weight x of its multiplier x I, and the
     frequency that sets it.
 
