@@ -73,9 +73,11 @@ def rate_sweep(system: System, rates: Sequence[float] = RATES) -> tuple[Rate, ..
             "A rate sweep takes one delay, and torque feedback is late too: leave out "
             "delays.delayed_torque_feedback."
         )
-    own = 1.0 / system.delays.sample_time if system.delays.sample_time else None
+    asked: set[float] = set(rates)
+    if system.delays.sample_time:
+        asked.add(round(1.0 / system.delays.sample_time, 6))
     found = []
-    for rate in sorted({*rates, *([] if own is None else [round(own, 6)])}):
+    for rate in sorted(asked):
         period = 1.0 / rate
         way = replace(system.delays, sample_time=period).d_1 - period
         margins = [
