@@ -1,6 +1,7 @@
 """Scenes that cannot be simulated end in a sentence; runs that go wrong end in a named outcome."""
 
 import signal
+
 import numpy as np
 import pytest
 

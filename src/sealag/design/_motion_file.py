@@ -4,6 +4,7 @@ import csv
 import io
 import itertools
 import zipfile
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
@@ -175,9 +176,9 @@ def _read_csv(file: BinaryIO, path: Path) -> dict[str, Array]:
         raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
     if ";" in names[0]:
         raise MotionError(f"{path} has semicolons between its cells; commas are right.")
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        raise MotionError(f"{path}: the column name {twice[0]!r} occurs twice.")
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        raise MotionError(f"{path}: the column name {twice!r} occurs twice.")
     whole: list[Array] = []
     rows = _csv_rows(lines, names, path)
     while block := list(itertools.islice(rows, _CSV_BLOCK)):
