@@ -87,6 +87,7 @@ def read_recording(path: str | Path) -> RecordingFile:
     metadata: dict[str, str] = {}
     attachments: dict[str, bytes] = {}
     complete = False
+    path = Path(path)
     with opened(path, what="The recording", largest=sys.maxsize) as file:
         if file.read(5) != b"\x89MCAP":
             raise FileError(f"{path} is not an MCAP recording.")
@@ -118,7 +119,7 @@ def read_recording(path: str | Path) -> RecordingFile:
     )
 
 
-def _not_ours(path: str | Path) -> FileError:
+def _not_ours(path: Path) -> FileError:
     return FileError(f"{path} is an MCAP file, but no recording that sealag wrote.")
 
 
