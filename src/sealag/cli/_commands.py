@@ -12,7 +12,7 @@ from sealag.cli._json import show_json
 from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
-from sealag.files import Draft, check_output, write_text
+from sealag.files import Draft, check_output, opened, write_text
 from sealag.passivity import Answer, Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
@@ -272,8 +272,10 @@ def verify_certificate(
 
 def _second(path: Path, *, as_json: bool) -> int:
     """Show what the second verifier decides; 1 if a claim does not hold."""
-    from sealag.second_verifier import WrongInputError, decided
+    from sealag.second_verifier import LARGEST_FILE, WrongInputError, decided
 
+    with opened(path, what="The certificate", largest=LARGEST_FILE):
+        pass  # the verifier itself would wait for a named pipe
     try:
         found = decided(str(path))
     except WrongInputError as error:
