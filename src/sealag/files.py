@@ -167,7 +167,8 @@ def _told(path: Path) -> Iterator[None]:
     except FileError:
         raise
     except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
+        why = "its folder is a file" if isinstance(error, FileExistsError) else error.strerror
+        raise FileError(f"{path} cannot be written: {why or error}.") from error
 
 
 class Draft:

@@ -401,6 +401,11 @@ USAGE = {
     "no scenario": (["simulate", "bundled:hume", "--scenario", ""], "scenario is ''"),
     "no end": (["simulate", "bundled:hume", "--duration", "1e300"], "1e9 s"),
     "no memory": (["simulate", "bundled:hume", "--duration", "1e8"], "GB"),
+    "a file for a folder": (
+        ["certify", "bundled:hume", "--out", f"{ROOT / 'README.md'}/c.json"],
+        "its folder is a file",
+    ),
+    "ten digits": (["certify", "bundled:hume", "--proofs", "9999999999"], "9 digits"),
     "late": (["simulate", "bundled:hume", "--delay-scale", "1e9"], "--delay-scale"),
     "early": (["simulate", "bundled:hume", "--delay-scale", "-1"], "--delay-scale"),
     "no horizon": (["margin", "bundled:hume", "--horizon-ms", "1e300"], "--horizon-ms"),

@@ -24,6 +24,8 @@ LARGEST_LIST = 250
 """Checks that hold and are shown one by one."""
 LONGEST_COUNT = 9
 """Digits of a number of instants: no motion has more."""
+MANY_INSTANTS = 20_000
+"""Instants from which a motion takes so long that a log says so."""
 
 
 def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
@@ -55,11 +57,17 @@ def compile_kernels() -> None:
 
 
 @contextmanager
-def _busy(what: str) -> Iterator[None]:
-    """Show a spinner on standard error if it is a terminal."""
+def _busy(what: str, motion: Motion | None = None) -> Iterator[None]:
+    """Show a spinner on standard error if it is a terminal; elsewhere say that a long motion takes
+    long."""
     from rich.console import Console
 
     console = Console(stderr=True)
+    instants = 1 if motion is None else len(motion)
+    if instants >= MANY_INSTANTS:
+        what = f"{what} {instants} instants: minutes for a million, Ctrl-C ends it"
+        if not console.is_terminal:
+            show(f"sealag: {what}", error=True)
     with console.status(what) if console.is_terminal else nullcontext():
         yield
 
@@ -75,7 +83,10 @@ def _count(proofs: str) -> int:
     """How many instants --proofs asks for."""
     number = proofs.isascii() and proofs.isdigit() and len(proofs) <= LONGEST_COUNT
     if not number or int(proofs) < 1:
-        raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
+        raise InputError(
+            f"--proofs is {proofs!r}; it must be a whole number from 1 up with at most "
+            f"{LONGEST_COUNT} digits, or all."
+        )
     return int(proofs)
 
 
@@ -100,7 +111,7 @@ def certify_project(
     design.check_question(system, along, criterion, time_varying=time_varying, proofs=count)
     with Draft(path) as draft:
         compile_kernels()
-        with _busy("certifying"):
+        with _busy("certifying", along):
             certificate = design.certify(
                 system, along, criterion=criterion, time_varying=time_varying, proofs=count
             )
@@ -182,7 +193,7 @@ def margin_project(
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
     along = _motion(system, motion)
     compile_kernels()
-    with _busy("computing margins"):
+    with _busy("computing margins", along):
         found = design.local_margins(system, along, horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
