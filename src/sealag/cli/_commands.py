@@ -26,6 +26,8 @@ LONGEST_COUNT = 9
 """Digits of a number of instants: no motion has more."""
 MANY_INSTANTS = 20_000
 """Instants from which a motion takes so long that a log says so."""
+SLOWEST_INSTANT_S = 0.03
+"""Search of one instant of ANYmal for crossings. Where bounds decide, it takes a hundredth."""
 
 
 def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
@@ -65,7 +67,8 @@ def _busy(what: str, motion: Motion | None = None) -> Iterator[None]:
     console = Console(stderr=True)
     instants = 1 if motion is None else len(motion)
     if instants >= MANY_INSTANTS:
-        what = f"{what} {instants} instants: minutes for a million, Ctrl-C ends it"
+        most = max(1, round(instants * SLOWEST_INSTANT_S / 60.0))
+        what = f"{what} {instants} instants: up to {most} min, Ctrl-C ends it"
         if not console.is_terminal:
             show(f"sealag: {what}", error=True)
     with console.status(what) if console.is_terminal else nullcontext():
