@@ -93,6 +93,16 @@ def test_a_crossing_that_takes_days_is_counted_where_rounding_leaves_it_open():
     assert not answers(later)[NO_EARLIER].ok
 
 
+def test_a_task_that_is_a_millionth_of_its_springs_is_verified():
+    """Its derivative is below what differences of carried torques leave."""
+    system = sealag.load(EXAMPLES / "hume_held.toml")
+    soft = tuple(replace(task, stiffness=1e-6 * task.stiffness) for task in system.law.tasks)
+    data = plain(sealag.certify(replace(system, law=replace(system.law, tasks=soft))))
+    assert failures(data) == []
+    data["local_loop"]["A_1"][8][6] += 1e-2
+    assert failures(data) != []
+
+
 def test_the_same_crossings_by_counting_roots():
     """An embedded part that does nothing leaves the roots where they are; the method is another."""
     for plant, margin in plants(4):

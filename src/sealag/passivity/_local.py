@@ -41,6 +41,10 @@ _DIFFERENCES = 1e-6
 1e-9 on a fixed base and to 1e-7 where contacts are followed. Ten times less accuses honest designs;
 ten times more would still be seen at the first crossing, which moves in proportion."""
 
+_SOFT = 1e-5
+"""Share of the stiffest spring below which F is weighed as if it were that: differences of torques
+that carry gravity leave 1e-10 Nm/rad, which no loop of such springs feels."""
+
 _UNRESOLVED = 100.0
 """Longest delay tried where no root crosses, as a multiple of 1/‖A_0 + A_1 + A_e‖."""
 
@@ -199,13 +203,25 @@ class LocalLoop:
         certified = question.criterion is Criterion.CERTIFIED
         known = proof if certified and by_motors and self.at is Place.POSTURE else None
         gap = max(gaps)
-        apart = self._command_gap(known, takes=takes, gain=gain, angle=angle)
+        apart = self._command_gap(
+            known,
+            takes=takes,
+            gain=gain,
+            angle=angle,
+            stiffest=float(question.spring_stiffness.max()),
+        )
         words = f"K, D_θ, D_s, friction and drives to {gap:.1e}, F over B_s to {apart:.1e}"
         ok = gap <= AGREEMENT and apart <= _DIFFERENCES
         return Check(name="frozen loop: motors", ok=ok, detail=words)
 
     def _command_gap(
-        self, proof: InstantProof | None, *, takes: Array, gain: Array, angle: Array
+        self,
+        proof: InstantProof | None,
+        *,
+        takes: Array,
+        gain: Array,
+        angle: Array,
+        stiffest: float,
     ) -> float:
         """How far A_1 is from rows that take the command, τ_osc = −F θ + … of free motions.
 
@@ -216,8 +232,9 @@ class LocalLoop:
         elsewhere = np.delete(self.A_1, takes, axis=0)
         gap = float(np.abs(elsewhere).max(initial=0.0)) / _size(self.A_1)
         if proof is not None:
-            gap = max(gap, float(np.abs(command[:, angle] + proof.F).max()) / _size(proof.F))
-            gap = max(gap, float(np.abs(command[:, angle[-1] + 1 :]).max()) / _size(proof.F))
+            size = max(_size(proof.F), _SOFT * stiffest)
+            gap = max(gap, float(np.abs(command[:, angle] + proof.F).max()) / size)
+            gap = max(gap, float(np.abs(command[:, angle[-1] + 1 :]).max()) / size)
         return gap
 
     def _symmetry_check(self) -> Check:
