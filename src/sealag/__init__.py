@@ -16,6 +16,7 @@ _HOME = {
     "simulate": "sealag.design",
     "verify_design": "sealag.design",
     "Controller": "sealag.whole_body",
+    "freeze": "sealag.whole_body",
     "Law": "sealag.whole_body",
     "LinkAngles": "sealag.whole_body",
     "Measurement": "sealag.whole_body",
@@ -59,6 +60,7 @@ __all__ = [
     "actuators",
     "actuators_of",
     "certify",
+    "freeze",
     "load",
     "load_motion",
     "load_robot",
@@ -83,6 +85,7 @@ if TYPE_CHECKING:
         StaticJoint,
         Tank,
         Task,
+        freeze,
     )
 
 

@@ -56,7 +56,7 @@ def opened(path: Path, *, what: str, largest: int) -> Iterator[BinaryIO]:
         FileError: it is missing, unreadable, too large, or not a regular file.
     """
     try:
-        with open(path, "rb") as file:
+        with open(path, "rb", opener=_without_waiting) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise FileError(f"{what} {path} is not a regular file.")
@@ -69,6 +69,11 @@ def opened(path: Path, *, what: str, largest: int) -> Iterator[BinaryIO]:
         raise FileError(f"{what} {path} cannot be read: {error.strerror or error}.") from error
     except ValueError as error:
         raise FileError(f"{what} {str(path)!r} cannot be read: {error}.") from error
+
+
+def _without_waiting(name: str, flags: int) -> int:
+    """Open a file; a named pipe that nobody writes into is opened too, instead of waited for."""
+    return os.open(name, flags | os.O_NONBLOCK)
 
 
 def _too_large(what: str, path: Path, largest: int) -> FileError:
@@ -162,7 +167,8 @@ def _told(path: Path) -> Iterator[None]:
     except FileError:
         raise
     except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
+        why = "its folder is a file" if isinstance(error, FileExistsError) else error.strerror
+        raise FileError(f"{path} cannot be written: {why or error}.") from error
 
 
 class Draft:

@@ -1,6 +1,8 @@
 """Bad input: one sentence that names file, key and remedy, exit status 2, never a traceback."""
 
+import os
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -47,6 +49,11 @@ CHANGES = {
     "missing damping": ("motor_damping = 100.0", "", ["motor_damping", "left_hip"]),
     "wrong length": ("stiffness = 100.0", "stiffness = [1.0, 2.0]", ["shape", "3"]),
     "negative gain": ("stiffness = 50.0", "stiffness = -50.0", ["stiffness"]),
+    "table without end": (
+        SINUSOID,
+        'central_round_trip = { kind = "table", time_s = [-1e308, 1e308], delay_ms = [1.0, 2.0] }',
+        ["time_s", "1e+12"],
+    ),
     "20-second delay": ("mean_ms = 20.0", "mean_ms = 20000.0", ["mean_ms", "unit"]),
     "amplitude beyond mean": ("amplitude_ms = 10.0", "amplitude_ms = 30.3",
         ["amplitude 30.3 ms", "mean 20 ms"]),
@@ -333,6 +340,35 @@ def test_csv_problem_is_named(name, walk, tmp_path, capsys):
     assert word in err
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("times", [(-1e308, 1e308), (0.0, 5e-324)])
+def test_times_without_velocities_are_named(times, walk, tmp_path, capsys):
+    system, motion = walk
+    path = tmp_path / "m.npz"
+    base = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    names = [*(f"base_{name}" for name in base), *system.robot.joints]
+    columns = dict(zip(names, motion.q[[0, 5]].T, strict=True))
+    np.savez(path, time_s=np.array(times), **columns)
+    err = fails(capsys, "certify", "bundled:hume", "--motion", path)
+    assert "m.npz" in err
+    assert "time_s" in err
+
+
+def test_many_column_names_are_refused_at_once(tmp_path, capsys):
+    path = tmp_path / "wide.csv"
+    path.write_text(",".join(f"c{k}" for k in range(300_000)) + "\n")
+    start = time.monotonic()
+    assert "'c0' is not known" in fails(capsys, "certify", "bundled:hume", "--motion", path)
+    assert time.monotonic() - start < 30.0
+
+
+def test_a_named_pipe_is_refused_and_not_waited_for(tmp_path, capsys):
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    for command in (["certify"], ["verify"], ["verify", "--second"]):
+        assert "not a regular file" in fails(capsys, *command, path)
+
+
 def test_nothing_read_is_overwritten(tmp_path, capsys):
     path = project(tmp_path)
     before = path.read_text()
@@ -365,6 +401,11 @@ USAGE = {
     "no scenario": (["simulate", "bundled:hume", "--scenario", ""], "scenario is ''"),
     "no end": (["simulate", "bundled:hume", "--duration", "1e300"], "1e9 s"),
     "no memory": (["simulate", "bundled:hume", "--duration", "1e8"], "GB"),
+    "a file for a folder": (
+        ["certify", "bundled:hume", "--out", f"{ROOT / 'README.md'}/c.json"],
+        "its folder is a file",
+    ),
+    "ten digits": (["certify", "bundled:hume", "--proofs", "9999999999"], "9 digits"),
     "late": (["simulate", "bundled:hume", "--delay-scale", "1e9"], "--delay-scale"),
     "early": (["simulate", "bundled:hume", "--delay-scale", "-1"], "--delay-scale"),
     "no horizon": (["margin", "bundled:hume", "--horizon-ms", "1e300"], "--horizon-ms"),

@@ -237,3 +237,20 @@ def test_installed_command_prints_json_only(tmp_path):
     assert json.loads(done.stdout)["status"] == "not_certified"
     assert done.stderr == ""
     assert np.isfinite(json.loads(done.stdout)["max_delay_s"])
+
+
+@pytest.mark.parametrize("criterion", ["certified", "published"])
+def test_the_certificate_of_a_law_that_cannot_run_holds(criterion, tmp_path, cli):
+    """Where q̄(θ) does not exist, no loop rests, and a certificate says so of its equilibrium."""
+    text = (EXAMPLES / "hume_held.toml").read_text(encoding="utf-8")
+    soft = text.replace("spring_stiffness = 350.0", "spring_stiffness = 1e-3")
+    assert soft != text
+    project, path = tmp_path / "soft.toml", tmp_path / "c.json"
+    project.write_text(soft, encoding="utf-8")
+    code, out, _ = cli("certify", project, "--criterion", criterion, "--json", "--out", path)
+    answer = json.loads(out)
+    assert code == 1
+    assert answer["equilibrium"]["found"] is False
+    assert "no equilibrium: q̄(θ) does not exist" in answer["reasons"][-1]
+    for options in ([], ["--second"], ["--project", project]):
+        assert cli("verify", path, *options)[0] == 0

@@ -58,3 +58,24 @@ def test_a_horizon_beyond_counting_is_refused(tmp_path, cli):
     code, text, _ = cli("margin", fast, "--horizon-ms", short[1], "--json")
     assert code == 0
     assert 1_000 < len(json.loads(text)["intervals"]) <= 10_000
+
+
+def test_a_rate_sweep_says_what_each_rate_tolerates(cli):
+    code, text, err = cli("margin", BAXTER, "--rate-sweep")
+    assert (code, err) == (0, "")
+    assert re.search(r"50\.0 Hz +9\d\.\d+ ms +\d+\.\d+ ms +[\d.]+ ms, stable", text)
+    assert text.splitlines()[-1].endswith("Hz: stable")
+    code, text, err = cli("margin", BAXTER, "--rate-sweep", "--horizon-ms", "150")
+    assert (code, text) == (2, "")
+    assert "--rate-sweep" in err
+
+
+def test_a_rate_sweep_in_json(cli):
+    code, text, _ = cli("margin", BAXTER, "--rate-sweep", "--json")
+    assert code == 0
+    rates = json.loads(text)["rates"]
+    assert [one["rate_hz"] for one in rates] == sorted(one["rate_hz"] for one in rates)
+    for one in rates:
+        known = one["largest_delay_s"] is not None
+        assert one["proven_s"] <= (one["largest_delay_s"] if known else one["proven_s"])
+        assert one["stable"] is True

@@ -43,13 +43,17 @@ def test_an_interrupted_run_stands_beside_the_whole_one(tmp_path, cli):
     process = subprocess.Popen(
         [sys.executable, "-m", "sealag", *words, "600"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # also in the background
     )  # fmt: skip
     draft, end = tmp_path / ".run.mcap.sealag-draft", time.monotonic() + 60.0
-    while not draft.exists() and time.monotonic() < end:
-        time.sleep(0.05)
-    time.sleep(4.0)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=120)
+    try:
+        while not draft.exists() and time.monotonic() < end:
+            time.sleep(0.05)
+        time.sleep(4.0)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=120)
+    finally:
+        process.kill()
     assert process.returncode == 130
     assert f"recorded in {beside}; {out} is as it was" in err
     assert out.read_bytes() == whole

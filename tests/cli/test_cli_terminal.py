@@ -171,3 +171,25 @@ assert compiled()
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr.count("set NUMBA_CACHE_DIR") == 1
+
+
+def test_kernels_that_may_not_be_compiled_are_named(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "sealag", "certify", str(CASE), "--out", str(tmp_path / "c.json")],
+        capture_output=True, text=True, timeout=120, check=False,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "NUMBA_DISABLE_JIT" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_log_says_that_a_long_motion_takes_long(tmp_path, cli):
+    """Where no spinner turns, and only there."""
+    files = ("--motion", tmp_path / "m.csv", "--out", tmp_path / "c.json")
+    for count, words in ((60, ""), (20_000, "certifying 20000 instants: up to 10 min")):
+        rows = "\n".join(f"{1e-3 * k},0.1" for k in range(count))
+        (tmp_path / "m.csv").write_text(f"time_s,j\n{rows}\n")
+        err = cli("certify", CASE, "--criterion", "published", *files)[2]
+        assert words in err
+        assert bool(err) == bool(words)

@@ -11,11 +11,14 @@ TESTS = {
     "law": "tests/unit/test_whole_body_spaces.py tests/unit/test_whole_body_frozen.py "
            "tests/unit/test_whole_body_law.py tests/unit/test_whole_body_signals.py "
            "tests/unit/test_whole_body_rest.py tests/unit/test_whole_body_tank.py "
+           "tests/unit/test_whole_body_static_ticks.py "
            "tests/unit/test_whole_body_controller.py tests/unit/test_design_cases.py "
            "tests/oracle/test_black_box_corpus.py",
     "margin": "tests/unit/test_margin_delay_margin.py tests/unit/test_margin_slow_crossings.py "
               "tests/unit/test_margin_embedded_delay.py tests/unit/test_margin_at_most.py "
-              "tests/unit/test_margin_bad_input.py tests/oracle/test_margin_known_systems.py "
+              "tests/unit/test_margin_bad_input.py tests/unit/test_margin_jitter.py "
+              "tests/unit/test_margin_sampled.py "
+              "tests/oracle/test_margin_known_systems.py "
               "tests/property/test_margin_never_exceeded.py",
     "passivity": "tests/unit/test_passivity_bounds.py tests/unit/test_passivity_storage.py "
                  "tests/unit/test_passivity_motion.py tests/unit/test_passivity_windows.py "
@@ -25,6 +28,7 @@ TESTS = {
                  "tests/oracle/test_passivity_against_sdp.py",
     "design": "tests/unit/test_design_local.py tests/unit/test_design_motors.py "
               "tests/unit/test_design_thresholds.py tests/unit/test_design_conditions.py "
+              "tests/unit/test_design_jitter.py "
               "tests/unit/test_design_withdrawn.py "
               "tests/unit/test_simulation_scenario_settings.py "
               "tests/unit/test_design_cases.py "
@@ -263,6 +267,59 @@ MUTANTS = [
          "end = 20.0 * max(item.period for item in moving)", "the horizon"),
         ("guaranteed=found.decided and found.explained and not zero_root", "guaranteed=True",
          "what is guaranteed"),
+    ),
+    *_of(
+        "margin", "margin/_jitter.py",
+        ("return _System(self.A, left, right @ self.A, right @ left)",
+         "return _System(self.A, left, right @ self.A, 0.0 * (right @ left))",
+         "a command that feeds back rates"),
+        ("return loop, Broken.of(loop, before, after)",
+         "return loop, Broken.of(loop, before, 0.5 * after)",
+         "what is late"),
+        ("low = high = float(np.linalg.norm(system.D, 2))", "low = high = 1e-9",
+         "a peak above all roots"),
+        ("weight = np.where(own, 1.0, x)", "weight = np.where(own, 1.0, 1.0)",
+         "weight of late torque feedback"),
+        ("delay *= 1.0 - min(2.0 * (peak.high - 1.0) + _BRACKET, 0.5)", "return delay, frequency",
+         "a peak between the grid's frequencies"),
+        ("broken.scaled(np.where(own, delay, root * e)", "broken.scaled(np.where(own, delay, root)",
+         "the drives' own delay"),
+        ("roots_at_once(loop.A_0 + loop.A_1 + loop.A_e)[0] if len(loop.A_0) else 0", "0",
+         "roots without delay"),
+    ),
+    *_of(
+        "margin", "margin/_sampled.py",
+        ("(waiting + 1, move @ old)]", "(waiting, move @ old)]",
+         "the part of a period that waits longer"),
+        ("(waiting + 1, move @ old)]", "(waiting + 1, old)]",
+         "what the plant does after an old command"),
+        ("proven = max(0.0, varying.delay - period)", "proven = varying.delay",
+         "a hold that costs nothing"),
+        ("low, high = (middle, high) if held.stable(middle) else (low, middle)", "high = middle",
+         "the last step"),
+    ),
+    *_of(
+        "design", "design/_rates.py",
+        ("way = replace(system.delays, sample_time=period).d_1 - period",
+         "way = replace(system.delays, sample_time=period).d_1", "the hold counted twice"),
+        ("stable = way <= margin.delay", "stable = True", "a rate that is too slow"),
+    ),
+    *_of(
+        "design", "design/_jitter.py",
+        ("least = min(least, *(_margin(loop) for loop in loops_at(along, k, local)))",
+         "least = min(least, max(_margin(loop) for loop in loops_at(along, k, local)))",
+         "the worse of posture and rest"),
+        ("if covered[k] >= least:\n            break", "break", "every instant but the first"),
+        ("return None if local.stable is None else 0.0", "return None",
+         "a loop that is unstable without delay"),
+        ("A_e=loop.A_e,", "A_e=None if loop.embedded_delay else loop.A_e,",
+         "torque feedback in the drives"),
+    ),
+    *_of(
+        "law", "kernels/control_law.py",
+        ("_foresee(control, static, angles)\n    # One", "pass\n    # One",
+         "q̄ that follows the motors"),
+        ("copy(angles, static.theta)", "pass", "where the motors were"),
     ),
     *_of(
         "passivity", "passivity/_solve.py",

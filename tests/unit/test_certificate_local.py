@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,33 @@ def test_crossings_of_random_plants_hold_and_later_ones_do_not():
         assert found == pytest.approx(margin.first_crossing, rel=1e-4)
         later += 1
     assert later == 8
+
+
+def slow_design():
+    """Hume held, with damping so strong that its first crossing takes two days."""
+    system = sealag.load(EXAMPLES / "hume_held.toml")
+    heavy = replace(system.actuators, motor_damping=np.full(system.robot.n, 1e6))
+    return plain(sealag.certify(replace(system, actuators=heavy)))
+
+
+def test_a_crossing_that_takes_days_is_counted_where_rounding_leaves_it_open():
+    data = slow_design()
+    assert data["first_crossing_s"] > 1e5
+    found = answers(data)
+    assert all(check.ok for check in found.values()), found
+    assert "is not excluded, with 0 roots" in found[NO_EARLIER].detail
+    later = {**data, "first_crossing_s": 1.02 * data["first_crossing_s"]}
+    assert not answers(later)[NO_EARLIER].ok
+
+
+def test_a_task_that_is_a_millionth_of_its_springs_is_verified():
+    """Its derivative is below what differences of carried torques leave."""
+    system = sealag.load(EXAMPLES / "hume_held.toml")
+    soft = tuple(replace(task, stiffness=1e-6 * task.stiffness) for task in system.law.tasks)
+    data = plain(sealag.certify(replace(system, law=replace(system.law, tasks=soft))))
+    assert failures(data) == []
+    data["local_loop"]["A_1"][8][6] += 1e-2
+    assert failures(data) != []
 
 
 def test_the_same_crossings_by_counting_roots():

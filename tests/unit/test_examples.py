@@ -8,6 +8,7 @@ from helpers.source import ROOT
 
 EXAMPLES = ROOT / "examples"
 PRINTS = {
+    "joint_pd": "40   1.0  drives  25.00 ms  25.00 ms  25.10 ms",
     "loop_margin": "margin 77.3",
     "packet_ages": "the certificate counts 19.50 ms",
     "recording": "/spring_power",

@@ -224,3 +224,10 @@ def test_long_names_are_written_or_refused_in_a_sentence(tmp_path):
         write_text(tmp_path / ("a" * 300), "x")
     with pytest.raises(FileError, match="too long"):
         check_output(tmp_path / ("a" * 300))
+
+
+def test_a_named_pipe_is_refused_and_not_waited_for(tmp_path):
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(FileError, match="regular"):
+        read_whole(path, what="It", largest=10)

@@ -124,6 +124,7 @@ def test_ctrl_c_at_any_instant_ends_a_run_and_nothing_else():
 import signal, sys
 from sealag.design import load
 import sealag
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in background
 system = load(sys.argv[1])
 sealag.simulate(system, duration=0.01)
 signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))

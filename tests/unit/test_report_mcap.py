@@ -98,6 +98,43 @@ def test_names_and_numbers_that_json_spells_otherwise(tmp_path):
     np.testing.assert_array_equal(signal.time, [0.0, 1.5])
 
 
+def test_damage_ends_a_recording_or_is_told(tmp_path):
+    """A changed byte gives what lies before it, or a FileError; never a changed number."""
+    path, damaged = tmp_path / "run.mcap", tmp_path / "damaged.mcap"
+    _write(path, count=3000)
+    good, whole = path.read_bytes(), read_recording(path).signals
+    rng = np.random.default_rng(5)
+    spots = [*rng.integers(5, len(good), 40), *(len(good) - rng.integers(1, 2000, 80))]
+    seen = set()
+    for spot, byte in zip(spots, rng.integers(0, 256, len(spots))):
+        damaged.write_bytes(good[:spot] + bytes([byte]) + good[spot + 1 :])
+        try:
+            found = read_recording(damaged)
+        except FileError:
+            continue
+        seen.add(found.complete)
+        for name, signal in found.signals.items():
+            part = whole[name].values[: len(signal.time)]
+            np.testing.assert_array_equal(signal.values, part)
+    assert seen == {True, False}
+
+
+def test_recordings_of_others_are_refused(tmp_path):
+    from mcap.writer import Writer
+
+    for content in (b"\x00\x01", b"{}"):
+        path = tmp_path / "other.mcap"
+        with open(path, "wb") as file:
+            writer = Writer(file)
+            writer.start()
+            schema = writer.register_schema("a", "jsonschema", b"{}")
+            channel = writer.register_channel("/a", "cdr", schema)
+            writer.add_message(channel, log_time=0, publish_time=0, data=content)
+            writer.finish()
+        with pytest.raises(FileError, match=r"other\.mcap is an MCAP file, but no recording"):
+            read_recording(path)
+
+
 def test_truncated_file_gives_what_it_holds(tmp_path):
     path = tmp_path / "run.mcap"
     _write(path, count=6000)

@@ -296,6 +296,7 @@ class TestNamedEnds:
                     signal.raise_signal(signal.SIGINT)
                 super().tick(t, measurement, out)
 
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in the background
         run = _run(hume, springs, _posture(hume), Pressed(np.zeros(6)))
         assert run.outcome is Outcome.INTERRUPTED
         np.testing.assert_array_equal(run.time, [0.0])

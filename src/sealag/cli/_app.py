@@ -151,12 +151,18 @@ def margin(
         float | None,
         typer.Option("--horizon-ms", help="List ranges of stable delays up to this one."),
     ] = None,
+    rate_sweep: Annotated[
+        bool,
+        typer.Option(
+            "--rate-sweep", help="Show what each sample rate of the controller tolerates instead."
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Compute the exact local delay margin of the frozen closed loop, along a motion."""
     from sealag.cli._commands import margin_project
 
-    margin_project(project, motion, horizon_ms=horizon_ms, as_json=as_json)
+    margin_project(project, motion, horizon_ms=horizon_ms, rate_sweep=rate_sweep, as_json=as_json)
 
 
 @app.command()

@@ -12,7 +12,7 @@ from sealag.cli._json import show_json
 from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
-from sealag.files import Draft, check_output, write_text
+from sealag.files import Draft, check_output, opened, write_text
 from sealag.passivity import Answer, Certificate, Criterion, Status, write_certificate
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
@@ -24,6 +24,10 @@ LARGEST_LIST = 250
 """Checks that hold and are shown one by one."""
 LONGEST_COUNT = 9
 """Digits of a number of instants: no motion has more."""
+MANY_INSTANTS = 20_000
+"""Instants from which a motion takes so long that a log says so."""
+SLOWEST_INSTANT_S = 0.03
+"""Search of one instant of ANYmal for crossings. Where bounds decide, it takes a hundredth."""
 
 
 def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
@@ -55,11 +59,18 @@ def compile_kernels() -> None:
 
 
 @contextmanager
-def _busy(what: str) -> Iterator[None]:
-    """Show a spinner on standard error if it is a terminal."""
+def _busy(what: str, motion: Motion | None = None) -> Iterator[None]:
+    """Show a spinner on standard error if it is a terminal; elsewhere say that a long motion takes
+    long."""
     from rich.console import Console
 
     console = Console(stderr=True)
+    instants = 1 if motion is None else len(motion)
+    if instants >= MANY_INSTANTS:
+        most = max(1, round(instants * SLOWEST_INSTANT_S / 60.0))
+        what = f"{what} {instants} instants: up to {most} min, Ctrl-C ends it"
+        if not console.is_terminal:
+            show(f"sealag: {what}", error=True)
     with console.status(what) if console.is_terminal else nullcontext():
         yield
 
@@ -75,7 +86,10 @@ def _count(proofs: str) -> int:
     """How many instants --proofs asks for."""
     number = proofs.isascii() and proofs.isdigit() and len(proofs) <= LONGEST_COUNT
     if not number or int(proofs) < 1:
-        raise InputError(f"--proofs is {proofs!r}; it must be a number from 1 up, or all.")
+        raise InputError(
+            f"--proofs is {proofs!r}; it must be a whole number from 1 up with at most "
+            f"{LONGEST_COUNT} digits, or all."
+        )
     return int(proofs)
 
 
@@ -100,7 +114,7 @@ def certify_project(
     design.check_question(system, along, criterion, time_varying=time_varying, proofs=count)
     with Draft(path) as draft:
         compile_kernels()
-        with _busy("certifying"):
+        with _busy("certifying", along):
             certificate = design.certify(
                 system, along, criterion=criterion, time_varying=time_varying, proofs=count
             )
@@ -160,9 +174,19 @@ def _show_certificate(certificate: Certificate, path: Path) -> None:
 
 
 def margin_project(
-    project: str, motion: Path | None, *, horizon_ms: float | None, as_json: bool
+    project: str,
+    motion: Path | None,
+    *,
+    horizon_ms: float | None,
+    rate_sweep: bool,
+    as_json: bool,
 ) -> None:
     """Show the exact local margin at every instant, or at a sample of a long motion."""
+    if rate_sweep:
+        if motion is not None or horizon_ms is not None:
+            raise InputError("--rate-sweep is of the project's posture: leave out the other.")
+        _sweep_rates(project, as_json=as_json)
+        return
     if horizon_ms is not None and not 0.0 < horizon_ms <= LONGEST_HORIZON_MS:
         raise InputError(
             f"--horizon-ms is {horizon_ms:g}; it must be more than 0 and at most "
@@ -172,7 +196,7 @@ def margin_project(
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
     along = _motion(system, motion)
     compile_kernels()
-    with _busy("computing margins"):
+    with _busy("computing margins", along):
         found = design.local_margins(system, along, horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
@@ -180,6 +204,7 @@ def margin_project(
         return
     show(f"{'local margin':26} {time_text(found.delay_s)}")
     show(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
+    show(f"{'jitter margin':26} {time_text(found.jitter_s)}")
     if found.frequency_rad_s is not None:
         show(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
     show(f"{'unstable roots':26} {found.unstable_modes} without delay")
@@ -189,6 +214,29 @@ def margin_project(
     show(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
     for low, high, count in found.intervals:
         show(f"{time_text(low):>14} to {time_text(high):14} {count} unstable roots")
+
+
+def _sweep_rates(project: str, *, as_json: bool) -> None:
+    """Show what each sample rate tolerates."""
+    system = design.load(project)
+    compile_kernels()
+    with _busy("lifting sampled loops"):
+        rates = design.rate_sweep(system)
+    if as_json:
+        show_json({"rates": [rate.summary() for rate in rates]})
+        return
+    show("rate          largest delay   proven          the design's, without the hold")
+    for rate in rates:
+        largest = "not lifted" if rate.margin.delay is None else time_text(rate.margin.delay)
+        verdict = {True: "stable", False: "unstable", None: "open"}[rate.stable]
+        show(
+            f"{rate.rate_hz:7.1f} Hz    {largest:15} {time_text(rate.margin.proven):15} "
+            f"{time_text(rate.way_s)}, {verdict}"
+        )
+    lost = [f"{rate.rate_hz:g}" for rate in rates if rate.stable is False]
+    kept = [f"{rate.rate_hz:g}" for rate in rates if rate.stable]
+    parts = ((lost, "unstable"), (kept, "stable"))
+    show("; ".join(f"{', '.join(some)} Hz: {word}" for some, word in parts if some))
 
 
 def verify_certificate(
@@ -238,8 +286,10 @@ def verify_certificate(
 
 def _second(path: Path, *, as_json: bool) -> int:
     """Show what the second verifier decides; 1 if a claim does not hold."""
-    from sealag.second_verifier import WrongInputError, decided
+    from sealag.second_verifier import LARGEST_FILE, WrongInputError, decided
 
+    with opened(path, what="The certificate", largest=LARGEST_FILE):
+        pass  # the verifier itself would wait for a named pipe
     try:
         found = decided(str(path))
     except WrongInputError as error:

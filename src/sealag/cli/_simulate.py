@@ -152,7 +152,7 @@ def _show(run: Run, answer: dict[str, Any], scenario: str) -> None:
         show(f"{name + ' energy':26} {values[0]:.4f} J at first, {values[-1]:.4f} J at last")
     for name, works in books.joint_flows.items():
         label = f"{name.removesuffix('_work').replace('_', ' ')} work"
-        show(f"{label:26} {float(works[-1].sum()):.4f} J")
+        show(f"{label:26} {float(works[-1].sum()):z.4f} J")
     show(
         f"{'first law':26} open by {answer['energy_residual_j']:.2e} J of "
         f"{answer['energy_throughput_j']:.4g} J moved"

@@ -7,6 +7,7 @@ from sealag.design._local import local_of, margin_of
 from sealag.design._margins import local_margins
 from sealag.design._motion_file import load_motion, save_motion
 from sealag.design._project import load, parse_project, resolve_project
+from sealag.design._rates import rate_sweep
 from sealag.design._recheck import verify_design
 from sealag.design._simulate import scenario_duration, simulate
 from sealag.design._starter import starter_project
@@ -24,6 +25,7 @@ __all__ = [
     "local_of",
     "margin_of",
     "parse_project",
+    "rate_sweep",
     "resolve_project",
     "save_motion",
     "scenario_duration",

@@ -1,7 +1,7 @@
 """From a system and a motion to a certificate."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 
 import numpy as np
@@ -167,6 +167,11 @@ def certify(
     )
     withdrawn = proven is not bound
     decided = np.zeros(len(motion)) if printed else bound.delay
+    local = local_of(along, decided, rest)
+    if (
+        rest is not None and rest.found and local.loop is None
+    ):  # a law that cannot run rests nowhere
+        rest = replace(rest, found=False, reason=local.problem)
     worst = delayed_stiffness(along.at([int(np.argmin(proven.delay))]), system, kind)
     case = _Case(
         system=system,
@@ -180,7 +185,7 @@ def certify(
         common=None if withdrawn else common,
         time_varying=None if withdrawn else moving,
         proofs=held,
-        local=local_of(along, decided, rest),
+        local=local,
         rest=rest,
     )
     return Certificate(question=_question(case), answer=_answer(case), evidence=_evidence(case))

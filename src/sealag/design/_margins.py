@@ -9,6 +9,7 @@ import numpy as np
 
 from sealag.design._along import Along
 from sealag.design._criteria import bounds_along
+from sealag.design._jitter import jitter_along
 from sealag.design._local import local_of, margin_of
 from sealag.design._system import System
 from sealag.errors import ContractionError, InputError, SolverError
@@ -26,6 +27,8 @@ class LocalMargins:
             was left open and none is unstable.
         first_crossing_s: smallest delay at which one more pair of roots crosses, s; None if not
             known.
+        jitter_s: smallest jitter margin over the instants, s: stable for every delay that varies as
+            it likes below it; 0 where the loop is unstable without delay, None if not known.
         frequency_rad_s: frequency of that pair, rad/s; None without one.
         mode: share of each joint's motor in that pair's motion.
         unstable_modes: roots with positive real part without delay, at that instant.
@@ -42,6 +45,7 @@ class LocalMargins:
 
     delay_s: float | None
     first_crossing_s: float | None
+    jitter_s: float | None
     frequency_rad_s: float | None
     mode: Mapping[str, float]
     unstable_modes: int
@@ -76,12 +80,13 @@ def _stated(value: Any) -> Any:
 def local_margins(
     system: System, motion: Motion | None = None, *, horizon: float | None = None
 ) -> LocalMargins:
-    """Decide the exact local margin of the law that runs, over all instants of a motion.
+    """Decide the exact local margin of the law that runs, and its jitter margin, over all instants.
 
-    Necessary and sufficient for local stability at constant delay with frozen coefficients, at the
-    equilibrium of the loop that holds an instant. The delay is d_1, the sum of all ways around the
-    loop; delayed torque feedback in the drives has a delay of its own. Instants that a potential
-    decides are computed only where their passive bound lies below the smallest margin.
+    The margin is necessary and sufficient for local stability at constant delay with frozen
+    coefficients, the jitter margin sufficient for delays that vary; both at the equilibrium of the
+    loop that holds an instant. The delay is d_1, the sum of all ways around the loop; delayed
+    torque feedback in the drives has a delay of its own. Instants that a potential decides are
+    computed only where their passive bound lies below the smallest margin.
 
     Args:
         system: the design.
@@ -97,7 +102,8 @@ def local_margins(
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
     motion = system.still() if motion is None else motion
     along = Along(system=system, motion=motion)
-    local = local_of(along, bounds_along(along, Criterion.CERTIFIED).bound.delay)
+    bounds = bounds_along(along, Criterion.CERTIFIED).bound.delay
+    local = local_of(along, bounds)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
         raise ContractionError(local.problem)
@@ -111,6 +117,7 @@ def local_margins(
     return LocalMargins(
         delay_s=local.margin_s,
         first_crossing_s=local.first_crossing_s,
+        jitter_s=jitter_along(along, bounds, local),
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=dict(zip(system.robot.joints, shares.tolist(), strict=True)),
         unstable_modes=margin.unstable_roots,

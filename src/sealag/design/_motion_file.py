@@ -4,6 +4,7 @@ import csv
 import io
 import itertools
 import zipfile
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
@@ -22,6 +23,8 @@ BASE_RATES = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
 CONTACT = "contact:"
 VELOCITY = ":velocity"
 LARGEST_BYTES = 2_000_000_000
+_LATEST = 1e12  # s
+_SHORTEST = 1e-9  # s between two rows, that velocities stay numbers
 _CSV_BLOCK = 10_000  # rows that are lists of Python numbers at a time
 
 
@@ -94,8 +97,12 @@ def _check_rows(table: dict[str, Array], path: Path) -> None:
             raise MotionError(f"{path} has no rows below its column names; at least one is needed.")
         bad, need = ~np.isfinite(column), "a finite number"
         if name == "time_s":
-            bad[1:] |= np.diff(column) <= 0.0
-            need = "more than in the row before: time must increase"
+            bad |= np.abs(column) > _LATEST
+            if not bad.any():
+                bad[1:] = np.diff(column) < _SHORTEST
+                need = f"at least {_SHORTEST:g} s more than in the row before: time must increase"
+            else:
+                need = f"a number within ± {_LATEST:g} s"
         elif name.startswith(CONTACT):
             bad, need = (column != 0.0) & (column != 1.0), "0 or 1"
         if bad.any():
@@ -175,9 +182,9 @@ def _read_csv(file: BinaryIO, path: Path) -> dict[str, Array]:
         raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
     if ";" in names[0]:
         raise MotionError(f"{path} has semicolons between its cells; commas are right.")
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        raise MotionError(f"{path}: the column name {twice[0]!r} occurs twice.")
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        raise MotionError(f"{path}: the column name {twice!r} occurs twice.")
     whole: list[Array] = []
     rows = _csv_rows(lines, names, path)
     while block := list(itertools.islice(rows, _CSV_BLOCK)):

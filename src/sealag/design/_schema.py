@@ -69,6 +69,7 @@ Gain = Annotated[
     _within(1e-6, 1e9, "1/s², or N/m or Nm/rad if stiffness_form is force", or_zero=True),
 ]
 Duration = Annotated[FiniteFloat, _within(1e-6, 1e6, "s")]
+Instant = Annotated[FiniteFloat, _within(-1e12, 1e12, "s")]
 Seed = Annotated[int, Field(ge=0)]
 
 
@@ -204,7 +205,7 @@ class TableDelay(DelayTable):
     """kind = "table": linear between instants"""
 
     kind: Literal["table"]
-    time_s: list[FiniteFloat]
+    time_s: list[Instant]
     delay_ms: list[Milliseconds]
 
 

@@ -75,8 +75,8 @@ def simulate(
 
     Raises:
         InputError: the scenario is unknown, duration, seed or delay_scale cannot be, the recording
-            would not fit into memory, a push does not act during the run, a foot begins inside
-            the ground, or the torque limits cannot hold the posture.
+            would not fit into the temporary folder, a push does not act during the run, a foot
+            begins inside the ground, or the torque limits cannot hold the posture.
     """
     setting = system.simulation
     kind = setting.scenario if scenario is None else scenario

@@ -10,11 +10,17 @@ import warnings
 from typing import Any
 
 from numba import njit, types
+from numba.core import config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 from numba.experimental import structref
+
+from sealag.errors import InputError
+
+if config.DISABLE_JIT:
+    raise InputError("NUMBA_DISABLE_JIT is set, and sealag's kernels are compiled: unset it.")
 
 
 class _NoEnvironments:

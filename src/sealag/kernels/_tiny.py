@@ -114,7 +114,7 @@ def _tick() -> None:
         space=operational_space.allocate(nv, 1, 1, m=1),
     )  # fmt: skip
     signal = control_law.Signal(
-        kind=control_law.TANK, iterations=1, settled=1e-12, diverged=10.0,
+        kind=control_law.TANK, first=1, iterations=1, settled=1e-12, diverged=10.0,
         static=control_law.Followed(one.copy(), one.copy(), square.copy(), none.copy()),
         tank=control_law.Tank(
             position=one.copy(), energy=np.ones(1), rate=1.0, delay_bound=0.0, corrected=True

@@ -121,7 +121,8 @@ class Signal(NamedTuple):
     """The running signal: where the law is taken, and what is carried from tick to tick."""
 
     kind: int  # MEASURED, STATIC or TANK
-    iterations: int  # Newton steps towards q̄(θ) at most
+    first: int  # Newton steps towards q̄(θ) at most in a tick that has no last one to follow
+    iterations: int  # and in any other
     settled: float  # rad; a smaller step is the last
     diverged: float  # rad; a larger step means no solution nearby
     static: Followed
@@ -153,6 +154,7 @@ def _tick(control, signal, period, q, angles, out):
         _foresee(control, static, angles)
     # One evaluation serves all signals: what is inlined once is compiled once.
     settled, steps = False, 0
+    most = signal.iterations if static.started[0] else signal.first
     while True:
         for i in range(angles.size):
             at.joints[i] = angles[i]
@@ -166,7 +168,7 @@ def _tick(control, signal, period, q, angles, out):
         status, settled = approach_static_state(control, signal, out)
         if status != EXISTS:
             return status
-        settled = settled or steps >= signal.iterations
+        settled = settled or steps >= most
         if settled:
             _end_search(control, static, out)
             for r in range(at.error.size):

@@ -284,7 +284,7 @@ def roots_at_once(A: Array) -> tuple[int, bool]:
     Returns:
         The count, and whether one of them lies on the imaginary axis to rounding.
     """
-    values, error = _eigenvalues_with_error(A)
+    values, error = eigenvalues_with_error(A)
     outside = values.real >= -error
     return int(outside.sum()), bool((outside & (values.real <= error)).any())
 
@@ -306,7 +306,7 @@ def undamped_whatever_the_delay(loop: Loop) -> bool:
         loop: a loop without an embedded delay.
     """
     for angle in _ANGLES:
-        values, error = _eigenvalues_with_error(loop.A_0 + np.exp(-1j * angle) * loop.A_1)
+        values, error = eigenvalues_with_error(loop.A_0 + np.exp(-1j * angle) * loop.A_1)
         if (np.abs(values.real) > error).all():
             return False
     return True
@@ -335,13 +335,16 @@ def rational(value: float) -> "fmpq":
     return fmpq(*float(value).as_integer_ratio())
 
 
-def _eigenvalues_with_error(A: Array) -> tuple[Array, Array]:
+def eigenvalues_with_error(A: Array) -> tuple[Array, Array]:
     """Eigenvalues of A, corrected by their residuals, and bounds of their errors.
 
     To first order an eigenvalue moves by yᴴ E x / yᴴ x. What E is in the entries of A is bounded
     entry by entry, so that slow modes beside stiff springs keep their digits; what the eigensolver
     adds, a share of ‖A‖, is taken out by the residual up to its square over the distance to the
     next eigenvalue. Where that distance is too small, the bounds of the whole norm are left.
+
+    Args:
+        A: (n, n).
     """
     from scipy.linalg import eig
 

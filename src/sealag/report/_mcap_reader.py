@@ -2,6 +2,7 @@
 
 import json
 import struct
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +11,12 @@ from typing import Any
 import numpy as np
 
 from sealag.errors import FileError, InputError
+from sealag.files import opened
 from sealag.report._mcap import JOINT_STATES, TRANSFORMS
 from sealag.typing import Array
+
+_FOREIGN = (AttributeError, KeyError, TypeError, ValueError)
+"""How the messages of others look to who expects sealag's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +66,7 @@ class RecordingFile:
 
 
 def read_recording(path: str | Path) -> RecordingFile:
-    """Read a recording back as arrays, also one that was cut off.
+    """Read a recording back as arrays, also one that was cut off or damaged, up to there.
 
     Args:
         path: an MCAP file that `McapRecorder` wrote.
@@ -70,48 +75,52 @@ def read_recording(path: str | Path) -> RecordingFile:
         Its signals, metadata and attachments.
 
     Raises:
-        FileError: the file is missing or is no MCAP file.
+        FileError: the file is missing, is no MCAP file, or one that sealag did not write.
     """
     from mcap.exceptions import McapError
     from mcap.records import Attachment, Channel, Footer, Message, Metadata
     from mcap.stream_reader import StreamReader
+    from zstandard import ZstdError
 
     channels: dict[int, Any] = {}
     rows: dict[int, list[tuple[float, list[float]]]] = {}
     metadata: dict[str, str] = {}
     attachments: dict[str, bytes] = {}
     complete = False
+    path = Path(path)
+    with opened(path, what="The recording", largest=sys.maxsize) as file:
+        if file.read(5) != b"\x89MCAP":
+            raise FileError(f"{path} is not an MCAP recording.")
+        file.seek(0)
+        try:
+            for record in StreamReader(file, validate_crcs=True).records:
+                match record:
+                    case Channel():
+                        channels.setdefault(record.id, record)  # the summary's again
+                    case Message():
+                        row = _row(channels[record.channel_id].topic, record.data)
+                        rows.setdefault(record.channel_id, []).append((record.log_time * 1e-9, row))
+                    case Metadata():
+                        metadata.update(record.metadata)
+                    case Attachment():
+                        attachments[record.name] = record.data
+                    case Footer():
+                        complete = True
+        except (McapError, ZstdError, struct.error):
+            complete = False
+        except _FOREIGN as error:
+            raise _not_ours(path) from error
     try:
-        with open(path, "rb") as file:
-            if file.read(5) != b"\x89MCAP":
-                raise FileError(f"{path} is not an MCAP recording.")
-            file.seek(0)
-            try:
-                for record in StreamReader(file).records:
-                    match record:
-                        case Channel():
-                            channels[record.id] = record
-                        case Message():
-                            row = _row(channels[record.channel_id].topic, record.data)
-                            rows.setdefault(record.channel_id, []).append(
-                                (record.log_time * 1e-9, row)
-                            )
-                        case Metadata():
-                            metadata.update(record.metadata)
-                        case Attachment():
-                            attachments[record.name] = record.data
-                        case Footer():
-                            complete = True
-            except (McapError, struct.error):
-                complete = False
-    except OSError as error:
-        if isinstance(error, FileError):
-            raise
-        raise FileError(f"{path} cannot be read: {error.strerror or error}.") from error
-    signals = {channels[key].topic: _signal(channels[key], found) for key, found in rows.items()}
+        signals = {channels[at].topic: _signal(channels[at], found) for at, found in rows.items()}
+    except _FOREIGN as error:
+        raise _not_ours(path) from error
     return RecordingFile(
         signals=signals, metadata=metadata, attachments=attachments, complete=complete
     )
+
+
+def _not_ours(path: Path) -> FileError:
+    return FileError(f"{path} is an MCAP file, but no recording that sealag wrote.")
 
 
 def _row(topic: str, data: bytes) -> list[float]:

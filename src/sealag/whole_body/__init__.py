@@ -1,6 +1,7 @@
 """The whole-body law: tasks, signals, the controller that runs it, and its frozen loop."""
 
 from sealag.whole_body._controller import Controller
+from sealag.whole_body._freeze import freeze
 from sealag.whole_body._frozen import FrozenLoop, sea_loop
 from sealag.whole_body._law import Law
 from sealag.whole_body._links import FreeLinks, LinkPlant
@@ -56,6 +57,7 @@ __all__ = [
     "TaskInertia",
     "TaskKind",
     "TickController",
+    "freeze",
     "relative_asymmetry",
     "sea_loop",
     "signal_named",

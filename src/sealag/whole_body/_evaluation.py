@@ -27,6 +27,9 @@ SETTLED = 1e-12
 """rad: a smaller Newton step of q̄(θ) is the last. Ten times larger shows in differences of the
 command over 1e-5 rad; ten times smaller is lost in rounding of angles."""
 
+_FIRST = 60
+"""Newton steps towards q̄(θ) from a first guess; a handful is enough where it exists."""
+
 DIVERGED = 10.0
 """rad: a Newton step of more than a turn means that there is no solution nearby."""
 
@@ -187,7 +190,8 @@ class LawEvaluation:
 
         Args:
             static: q̄(θ) from tick to tick, moved; None for measured angles.
-            iterations: Newton steps towards q̄(θ) at most.
+            iterations: Newton steps towards q̄(θ) a tick at most; the first one searches until it
+                has settled.
             tank: lets x̂ follow x(q̄(θ)).
         """
         kernel = self._kernel
@@ -199,7 +203,7 @@ class LawEvaluation:
         else:
             kind = kernel.TANK
         signal = kernel.Signal(
-            kind=kind, iterations=iterations, settled=SETTLED, diverged=DIVERGED,
+            kind=kind, first=_FIRST, iterations=iterations, settled=SETTLED, diverged=DIVERGED,
             static=static or self.followed(np.zeros(self.robot.n)), tank=tank.memory,
         )  # fmt: skip
         return keep(signal)
@@ -238,16 +242,14 @@ class LawEvaluation:
         if len(self._levels) > 2:
             leave_to_higher(self._at.J_t, self.space.lift, self._levels, rate, self._at.shift)
 
-    def static(self, q: Array, theta: Array, sag: Array, iterations: int, out: Array) -> None:
+    def static(self, q: Array, theta: Array, sag: Array, out: Array) -> None:
         """Evaluate at q̄(θ) of Eqs. (15), (16), by Newton's method from a sag q̄ − θ, moved.
 
         Raises:
             ContractionError: q̄(θ) does not exist, or is not found.
             RobotError: the mass matrix is not positive definite.
         """
-        self.tick(
-            self.running(static=self.followed(sag), iterations=iterations), 0.0, q, theta, out
-        )
+        self.tick(self.running(static=self.followed(sag)), 0.0, q, theta, out)
 
     def _moved(self) -> Array:
         """Minus the errors' Jacobian (m, n) by joint angles, where the law was last evaluated."""

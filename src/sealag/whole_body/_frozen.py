@@ -100,6 +100,44 @@ class FrozenLoop:
         bend = 0.0
         if beside is not None:
             bend = command.change(signal.derivative(rest.q, rest.theta, beside))
+        loop = cls.with_derivative(
+            robot,
+            command,
+            actuators,
+            contacts=contacts,
+            rest=rest,
+            embedded_delay=embedded_delay,
+        )
+        return replace(loop, bend=bend)
+
+    @classmethod
+    def with_derivative(
+        cls,
+        robot: Robot,
+        command: LawDerivative,
+        actuators: Actuators,
+        *,
+        contacts: tuple[Contact, ...],
+        rest: Rest,
+        embedded_delay: float | None = None,
+        C_v: Array | None = None,
+        C_theta_dot: Array | None = None,
+    ) -> "FrozenLoop":
+        """Close the loop of links, motors and drives with the derivative of any law.
+
+        Args:
+            robot: the robot.
+            command: the law's derivative at rest.
+            actuators: springs, motors and drives.
+            contacts: which frames are held.
+            rest: where the loop rests.
+            embedded_delay: how late torque feedback is in the drives, s; None for without delay.
+            C_v: (n, nv) command of tangent velocities, Nms/rad; None for none.
+            C_theta_dot: (n, n) command of motor velocities, Nms/rad; None for none.
+
+        Returns:
+            The frozen loop.
+        """
         links = LinkPlant(robot, contacts).free(rest.q, rest.tau_sea)
         links, kept, C_z, B_z = _without_momentum(links, command)
         memory = Memory(
@@ -121,7 +159,12 @@ class FrozenLoop:
             symmetries=kept,
             embedded_delay=embedded_delay,
         )
-        return replace(loop, bend=bend)
+        C, at = loop.C.copy(), _Places(links.Z.shape[1], robot.n, drives=0, memory_size=0)
+        if C_v is not None:
+            C[:, at.z_rate] += C_v @ links.Z
+        if C_theta_dot is not None:
+            C[:, at.theta_rate] += C_theta_dot
+        return replace(loop, C=C)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,6 @@ from sealag.whole_body._tasks import GravityCompensation
 if TYPE_CHECKING:
     from sealag.whole_body._evaluation import LawEvaluation
 
-_SETTLE = 60
-"""Newton iterations for q̄(θ) of a state that does not move; a handful is enough where it exists."""
-
 STEP = 2e-5
 """rad, m: half the base of central differences of the command, extrapolated with those of half the
 base. Near singular postures, where the law bends within 1e-3 rad, plain differences of 1e-5 rad
@@ -230,7 +227,7 @@ class StaticState:
         self._law.follow(measurement.q)
 
     def command(self, t: float, measurement: Measurement, out: Array) -> None:
-        """Write τ_osc, with a few Newton steps from the last q̄."""
+        """Write τ_osc, with few Newton steps from where q̄ follows the motors."""
         self.tick(0.0, measurement, out)
 
     def tick(self, period: float, measurement: Measurement, out: Array) -> None:
@@ -240,7 +237,7 @@ class StaticState:
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command at the settled q̄: V_3 at q̄ less ½ lᵀ K⁻¹ l."""
         sag = self.followed.sag.copy()
-        self._law.static(measurement.q, measurement.theta, sag, _SETTLE, out)
+        self._law.static(measurement.q, measurement.theta, sag, out)
         energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
         energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
         return Present(energy, measurement.theta + sag)
@@ -255,7 +252,7 @@ class StaticState:
         law, joints = self._law, self._law.robot.joint_positions(q)
         sag = joints - theta
         law.follow(q)
-        law.settled(lambda: law.static(q, theta, sag, _SETTLE, out), lambda: theta + sag - joints)
+        law.settled(lambda: law.static(q, theta, sag, out), lambda: theta + sag - joints)
 
     def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
         """Differentiate the settled command."""

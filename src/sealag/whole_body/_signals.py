@@ -115,8 +115,8 @@ class StaticJoint(Signal):
 
     Attributes:
         iterations: Newton steps towards q̄(θ) a tick at most, from where q̄ follows the motors to
-            first order. One leaves 2e-6 rad where all joints of ANYmal move by 2 rad/s; each more
-            evaluates the law once more.
+            first order; the first tick searches until it has settled. One leaves 2e-6 rad where
+            all joints of ANYmal move by 2 rad/s; each more evaluates the law once more.
     """
 
     iterations: int = 1

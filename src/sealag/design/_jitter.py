@@ -1,0 +1,74 @@
+"""The largest delay that may vary as it likes, over all instants of a motion."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sealag.design._along import Along
+from sealag.design._local import MOST_EXACT, Local
+from sealag.errors import SolverError
+from sealag.margin import jitter_margin
+from sealag.passivity import Basis, Place
+from sealag.typing import Array
+from sealag.whole_body import FrozenLoop
+
+
+def jitter_along(along: Along, bounds: Array, local: Local) -> float | None:
+    """Largest delay at which every instant is stable however the delay varies below it, s.
+
+    What is passive at a delay is so however it varies: an instant in a minimum of its potential
+    tolerates at least its passive bound. The jitter margin (docs/theory section 7.4) is computed
+    at all other instants, and where that bound lies below the smallest answer so far.
+
+    Args:
+        along: the design and its motion.
+        bounds: (N,) of the certified criterion, s; 0 where it decides nothing.
+        local: stability over the same motion.
+
+    Returns:
+        The delay; 0 if an instant is unstable without delay, None if that is not known, the answer
+        of an instant is left open, or too many would have to be computed.
+    """
+    if not local.stable:
+        return None if local.stable is None else 0.0
+    minimum = (local.basis == Basis.BOUND) | (local.basis == Basis.SEARCHED)
+    covered = np.where(minimum, bounds, 0.0)
+    least = np.inf
+    for turn, k in enumerate(np.argsort(covered, kind="stable").tolist()):
+        if covered[k] >= least:
+            break
+        if turn == MOST_EXACT:
+            return float(covered[k]) or None
+        try:
+            least = min(least, *(_margin(loop) for loop in loops_at(along, k, local)))
+        except SolverError:
+            return None
+    return float(least)
+
+
+def _margin(loop: FrozenLoop) -> float:
+    return jitter_margin(
+        loop.A_0,
+        loop.B,
+        loop.C,
+        A_e=loop.A_e,
+        embedded_delay=loop.embedded_delay,
+        symmetries=loop.symmetries,
+    ).delay
+
+
+def loops_at(along: Along, k: int, local: Local) -> Iterator[FrozenLoop]:
+    """The loops of an instant: in its posture and, where the law sags, where it rests."""
+    system, motion = along.system, along.motion
+    posture = system.in_posture(motion, k)
+    known = local.loop if k == local.critical else None
+    if known is not None and local.at is Place.POSTURE:
+        yield known
+    else:
+        yield system.frozen(motion, k, rest=posture)
+    if system.law.rests_at_posture and posture.found:
+        return
+    if known is not None and local.at is Place.REST:
+        yield known
+    else:
+        yield system.frozen(motion, k, rest=system.rest(motion, k))

@@ -1,0 +1,92 @@
+"""What a sample rate costs: sampled and held loops of one design."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from sealag.design._along import Along
+from sealag.design._criteria import bounds_along
+from sealag.design._jitter import loops_at
+from sealag.design._local import local_of
+from sealag.design._system import System
+from sealag.errors import ContractionError, InputError
+from sealag.margin import SampledMargin, sampled_margin
+from sealag.passivity import Criterion
+
+RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0)
+"""Hz, of a sweep if nothing else is asked for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rate:
+    """One sample rate of a design.
+
+    Attributes:
+        rate_hz: of the central controller.
+        way_s: the design's delay at that rate, without the hold, s.
+        margin: largest constant delay beside the hold.
+        stable: whether the sampled loop is stable at that delay and all that were tried below; None
+            if it is too large to be tried.
+    """
+
+    rate_hz: float
+    way_s: float
+    margin: SampledMargin
+    stable: bool | None
+
+    def summary(self) -> dict[str, Any]:
+        """Return everything as JSON says it."""
+        largest = self.margin.delay
+        unbounded = largest is not None and math.isinf(largest)
+        return {
+            "rate_hz": self.rate_hz,
+            "way_s": self.way_s,
+            "stable": self.stable,
+            "largest_delay_s": "unbounded" if unbounded else largest,
+            "proven_s": "unbounded" if math.isinf(self.margin.proven) else self.margin.proven,
+        }
+
+
+def rate_sweep(system: System, rates: Sequence[float] = RATES) -> tuple[Rate, ...]:
+    """Return what each sample rate tolerates, in the design's posture; docs/theory section 7.6.
+
+    The controller samples, computes and holds once a period; its delay is that of the design's
+    links without the hold. Where the law sags, posture and rest both count.
+
+    Args:
+        system: the design.
+        rates: Hz; the design's own comes on top.
+
+    Raises:
+        InputError: torque feedback is late in the drives: the loop has two delays.
+        ContractionError: q̄(θ) is fed back and does not exist.
+        SolverError: rounding leaves a jitter margin open.
+    """
+    along = Along(system=system, motion=system.still())
+    local = local_of(along, bounds_along(along, Criterion.CERTIFIED).bound.delay)
+    if local.loop is None:
+        raise ContractionError(local.problem)
+    loops = list(loops_at(along, 0, local))
+    if any(loop.A_e.any() and loop.embedded_delay for loop in loops):
+        raise InputError(
+            "A rate sweep takes one delay, and torque feedback is late too: leave out "
+            "delays.delayed_torque_feedback."
+        )
+    asked: set[float] = set(rates)
+    if system.delays.sample_time:
+        asked.add(round(1.0 / system.delays.sample_time, 6))
+    found = []
+    for rate in sorted(asked):
+        period = 1.0 / rate
+        way = replace(system.delays, sample_time=period).d_1 - period
+        margins = [
+            sampled_margin(loop.A_0, loop.B, loop.C, period=period, symmetries=loop.symmetries)
+            for loop in loops
+        ]
+        margin = min(margins, key=lambda one: one.proven if one.delay is None else one.delay)
+        stable = True if way <= (margin.delay or margin.proven) else None
+        if margin.delay is not None:
+            stable = way <= margin.delay
+        found.append(Rate(rate_hz=rate, way_s=way, margin=margin, stable=stable))
+    return tuple(found)

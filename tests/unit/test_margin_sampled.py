@@ -1,0 +1,132 @@
+"""Sampled and held loops: textbook limits, and a simulation that shares no code."""
+
+import heapq
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from sealag.errors import InputError
+from sealag.margin import delay_margin, jitter_margin, sampled_margin, sampled_radius
+
+INTEGRATOR = ([[0.0]], [[1.0]])
+
+
+def spring_joint():
+    """A link on a spring, its motor, and motor feedback of gain 100."""
+    A_0 = np.array([
+        [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0],
+        [-350.0, 350.0, -0.1, 0.0], [3500.0, -3500.0, 0.0, -100.0],
+    ])  # fmt: skip
+    return A_0, np.array([[0.0], [0.0], [0.0], [10.0]]), np.array([[0.0, -100.0, 0.0, 0.0]])
+
+
+def simulated(A_0, B, C, *, period, delay, periods):
+    """|x| at each sample: exact motion between events, commands in a queue by when they arrive."""
+    N = len(A_0)
+    both = np.zeros((N + B.shape[1], N + B.shape[1]))
+    both[:N, :N], both[:N, N:] = A_0, B
+    x, u, t, sizes = np.ones(N), np.zeros(B.shape[1]), 0.0, []
+    waiting = []
+    for k in range(periods):
+        sizes.append(float(np.linalg.norm(x)))
+        heapq.heappush(waiting, (k * period + delay, tuple(C @ x)))
+        end = (k + 1) * period
+        while True:
+            due = min(waiting[0][0], end) if waiting else end
+            x = (expm(both * (due - t)) @ np.concatenate([x, u]))[:N]
+            t = due
+            if due >= end:
+                break
+            u = np.array(heapq.heappop(waiting)[1])
+    return np.array(sizes)
+
+
+def rate_of(sizes, window=20):
+    """Growth a period over the second half, of the largest size in a window."""
+    half = len(sizes) // 2
+    growth = sizes[-window:].max() / sizes[half : half + window].max()
+    return growth ** (1.0 / (len(sizes) - half - window))
+
+
+@pytest.mark.parametrize(
+    ("periods_late", "limit"), [(0.0, 2.0), (1.0, 1.0), (2.0, (math.sqrt(5.0) - 1.0) / 2.0)]
+)
+@pytest.mark.parametrize("gain", [1.0, 7.0])
+def test_an_integrator_has_its_textbook_limits(periods_late, limit, gain):
+    """z − 1 + kT = 0, z² − z + kT = 0, z³ − z² + kT = 0."""
+    for share in (0.999, 1.001):
+        T = share * limit / gain
+        radius = sampled_radius(*INTEGRATOR, [[-gain]], period=T, delay=periods_late * T)
+        assert (radius < 1.0) == (share < 1.0)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.003, 0.01, 0.0137, 0.02])
+def test_the_radius_is_the_growth_of_a_simulation(delay):
+    for period in (0.01, 0.04):
+        A_0, B, C = spring_joint()
+        sizes = simulated(A_0, B, C, period=period, delay=delay, periods=600)
+        radius = sampled_radius(A_0, B, C, period=period, delay=delay)
+        assert rate_of(sizes) == pytest.approx(radius, abs=2e-3)
+
+
+@pytest.mark.parametrize("period", [0.004, 0.02, 0.06])
+def test_a_simulation_decays_below_the_margin_and_grows_above(period):
+    A_0, B, C = spring_joint()
+    found = sampled_margin(A_0, B, C, period=period)
+    assert found.proven <= found.delay
+    for share in (0.97, 1.03):
+        sizes = simulated(A_0, B, C, period=period, delay=share * found.delay, periods=1500)
+        assert (rate_of(sizes, window=round(1.0 / period)) < 1.0) == (share < 1.0)
+
+
+def test_fast_sampling_tends_to_the_continuous_margin():
+    """A hold is half a period late on average."""
+    A_0, B, C = spring_joint()
+    exact = delay_margin(A_0, B @ C).delay
+    lost = [exact - sampled_margin(A_0, B, C, period=T).delay for T in (0.02, 0.01, 0.005)]
+    np.testing.assert_allclose(lost, [0.01, 0.005, 0.0025], rtol=0.05)
+
+
+def test_up_to_the_jitter_margin_less_a_period_it_is_proven():
+    A_0, B, C = spring_joint()
+    varying = jitter_margin(A_0, B, C).delay
+    assert sampled_margin(A_0, B, C, period=0.01).proven == varying - 0.01
+    assert sampled_margin(A_0, B, C, period=2.0 * varying).proven == 0.0
+
+
+def test_the_last_step_is_bisected():
+    A_0, B, C = spring_joint()
+    found = sampled_margin(A_0, B, C, period=0.02)
+    assert sampled_radius(A_0, B, C, period=0.02, delay=found.delay) < 1.0
+    assert sampled_radius(A_0, B, C, period=0.02, delay=found.delay + 2e-6) > 1.0
+
+
+def test_ends():
+    assert sampled_margin([[-1.0]], [[1.0]], [[0.0]], period=0.1).delay == math.inf
+    assert sampled_margin([[1.0]], [[1.0]], [[0.5]], period=0.1).delay == 0.0
+    assert sampled_margin(*INTEGRATOR, [[-1.0]], period=2.1).delay == 0.0
+    slow = sampled_margin([[-1.0]], [[1.0]], [[-1.01]], period=1e-3)
+    assert slow.delay is None
+    assert slow.proven > 0.9
+
+
+def test_symmetries_are_left_out():
+    A_0, B, C = spring_joint()
+    wide = np.zeros((6, 6))
+    wide[:4, :4], wide[4, 5] = A_0, 1.0
+    along = np.eye(6)[:, 4:5]
+    both = np.vstack([B, np.zeros((2, 1))]), np.hstack([C, np.zeros((1, 2))])
+    found = sampled_radius(wide, *both, period=0.01, delay=0.01, symmetries=along)
+    assert found == pytest.approx(sampled_radius(A_0, B, C, period=0.01, delay=0.01), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("period", "delay", "words"),
+    [(0.0, 0.1, "period is 0 s"), (-1.0, 0.1, "period"), (0.1, -1.0, "delay"),
+     (1e-4, 1.0, "more than can be lifted")],
+)  # fmt: skip
+def test_wrong_times_are_named(period, delay, words):
+    with pytest.raises(InputError, match=words):
+        sampled_radius(*INTEGRATOR, [[-1.0]], period=period, delay=delay)
