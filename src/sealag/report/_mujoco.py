@@ -15,6 +15,7 @@ from sealag.report._mujoco_delays import StepCounts
 from sealag.robot import ContactKind
 from sealag.simulation import fastest_link
 from sealag.typing import Array, ArrayLike
+from sealag.whole_body import Rest
 
 LONGEST_STEP = 1e-3
 """s; MuJoCo's integrators are of first order: a step ten times longer shows in every joint."""
@@ -28,9 +29,10 @@ _NOTHING = 1e-14
 less than 1e-15; ten thousand times more would show in the smallest rotor that a project may have."""
 
 _ABOUT = """
-Written by sealag export. Links in the design's posture, one rotor and one spring for each joint.
+Written by sealag export. One rotor and one spring for each joint; the keyframe is where the loop rests.
 {delays}
-Every step: mj_step1, then every {tick} steps read sensordata and write ctrl, then mj_step2.
+Every step: mj_step1; where the steps so far are a multiple of {tick}, read sensordata, which mj_step1
+has made, and write ctrl; mj_step2. After mj_step sensordata is one step older than the state.
  - nsample is the delay in steps, not more: with more samples rounding of the time makes the delay
    jump between two steps. With fewer it is shorter.
  - Before the first command has arrived, ctrl is 0: fill the past with mj_initCtrlHistory.
@@ -75,12 +77,13 @@ def mujoco_model(system: System, *, step: float | None = None) -> MujocoModel:
     Rotors are joints of their own with armature B_s and damping D_θ + β b_v, springs are tendons
     K (θ − q) + D_s (θ̇ − q̇) between rotor and joint, Eqs. (6), (8); motors act on rotors. Motors are
     late by both ways down, sensors by the way up, the hold is the caller's (docs/theory section
-    15). Contacts are equalities where the posture has them, active as certificates assume.
+    15). Contacts are equalities where the posture has them, active as certificates assume. The
+    keyframe is where the loop rests.
 
     Args:
         system: the design.
-        step: MuJoCo's time step, s; the longest decimal one that divides delays and period and
-            resolves the springs if None.
+        step: MuJoCo's time step, s; the longest that divides delays and period and resolves the
+            springs if None.
 
     Returns:
         The model. The program MuJoCo is not needed.
@@ -96,7 +99,7 @@ def mujoco_model(system: System, *, step: float | None = None) -> MujocoModel:
     motor_rate = np.sqrt((drives.spring_stiffness / drives.shaped_inertia).max())
     longest = min(LONGEST_STEP, 1.0 / (STEPS_PER_RADIAN * float(np.hypot(link_rate, motor_rate))))
     steps = StepCounts.of(system.delays, longest=longest, step=step)
-    rest = system.in_posture()
+    rest = system.rest()
     file = Element("mujoco", model=system.name)
     file.append(ElementTree.Comment(_about(system, steps)))
     SubElement(
@@ -112,11 +115,13 @@ def mujoco_model(system: System, *, step: float | None = None) -> MujocoModel:
     _springs(system, SubElement(file, "tendon"))
     if system.contacts:
         _contacts(system, world, SubElement(file, "equality"))
+    late = _late(steps.command_delay, steps.command)
     motors = SubElement(file, "actuator")
     for name in drives.joints:
-        SubElement(motors, "motor", name=name, joint=_rotor(name), **_late(steps, steps.command))
-    _sensors(system, SubElement(file, "sensor"), _late(steps, steps.measurement))
-    _key(SubElement(file, "keyframe"), system, order, rest.theta, rest.tau_sea)
+        SubElement(motors, "motor", name=name, joint=_rotor(name), **late)
+    late = _late(steps.measurement_delay, steps.measurement)
+    _sensors(system, SubElement(file, "sensor"), late)
+    SubElement(file, "keyframe").append(_key(system, order, rest))
     ElementTree.indent(file)
     text = ElementTree.tostring(file, encoding="unicode") + "\n"
     return MujocoModel(text=text, steps=steps, left_out=tuple(_left_out(system, rest.reason)))
@@ -162,8 +167,8 @@ def _named(names: Sequence[str], which: Array) -> str:
 def _about(system: System, steps: StepCounts) -> str:
     """The comment at the head of the file, in which no name may stand: -- would end it."""
     delays = (
-        f"Delay: sensors {steps.measurement} steps, motors {steps.command} steps, hold "
-        f"{steps.tick} steps; together {steps.total * 1e3:.9g} ms. The design counts d_1 = "
+        f"Delays in steps: sensors {steps.measurement}, motors {steps.command}, hold "
+        f"{steps.tick}; together {steps.total * 1e3:.9g} ms. The design counts d_1 = "
         f"{system.delays.d_1 * 1e3:.9g} ms."
     )
     return _ABOUT.format(delays=delays, tick=steps.tick)
@@ -239,9 +244,7 @@ def _rotors(system: System, world: Element) -> None:
     for i, name in enumerate(drives.joints):
         body = SubElement(world, "body", name=_rotor(name))
         nothing = repr(_NOTHING)
-        SubElement(
-            body, "inertial", pos="0 0 0", mass=nothing, diaginertia=" ".join([nothing] * 3)
-        )
+        SubElement(body, "inertial", pos="0 0 0", mass=nothing, diaginertia=" ".join([nothing] * 3))
         values = {
             "armature": drives.shaped_inertia[i],
             "damping": drives.motor_damping[i] + shaping[i] * drives.viscous_friction[i],
@@ -275,11 +278,9 @@ def _contacts(system: System, world: Element, equality: Element) -> None:
         )  # fmt: skip
 
 
-def _late(steps: StepCounts, count: int) -> dict[str, str]:
+def _late(delay: float, count: int) -> dict[str, str]:
     """Attributes of a delay: exactly as many samples as steps, so that reading is never between."""
-    if not count:
-        return {}
-    return {"delay": repr(round(count * steps.step, 12)), "nsample": str(count), "interp": "zoh"}
+    return {"delay": repr(delay), "nsample": str(count), "interp": "zoh"} if count else {}
 
 
 def _sensors(system: System, sensor: Element, late: dict[str, str]) -> None:
@@ -302,17 +303,13 @@ def _sensors(system: System, sensor: Element, late: dict[str, str]) -> None:
             SubElement(sensor, kind, {"name": f"{kind} of {name}", "joint": name, **late})
 
 
-def _key(
-    keyframe: Element, system: System, order: Sequence[str], theta: Array, command: Array
-) -> None:
-    """Write the posture with springs that carry gravity; a quaternion begins with w."""
-    robot, q = system.robot, system.posture
+def _key(system: System, order: Sequence[str], rest: Rest) -> Element:
+    """Return where the loop rests, as a keyframe; a quaternion begins with w."""
+    robot, q = system.robot, rest.q
     base = [*q[:3], q[6], *q[3:6]] if robot.floating_base else []
     joints = robot.joint_positions(q)[[robot.joint_index(name) for name in order]]
-    SubElement(
-        keyframe, "key", name="posture", qpos=_numbers([*base, *joints, *theta]),
-        ctrl=_numbers(command),
-    )  # fmt: skip
+    place = _numbers([*base, *joints, *rest.theta])
+    return Element("key", name="rest", qpos=place, ctrl=_numbers(rest.tau_sea))
 
 
 def _left_out(system: System, unbalanced: str) -> Iterable[str]:
@@ -327,4 +324,4 @@ def _left_out(system: System, unbalanced: str) -> Iterable[str]:
     if system.contacts:
         yield "ground and friction; contacts are held where the posture has them, both ways"
     if unbalanced:
-        yield f"an equilibrium: {unbalanced}"
+        yield f"an equilibrium, so that the keyframe is no rest: {unbalanced}"

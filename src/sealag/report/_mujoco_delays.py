@@ -14,7 +14,7 @@ takes 1/3 ms, written with nine digits, for a multiple of 1 ns; a hundred times 
 rounding of 5 s."""
 
 LEAST_STEP = 1e-6
-"""s; as short as simulation.physics_step_ms may be. Shorter only if delays share no decimal step."""
+"""s; as short as simulation.physics_step_ms may be. Delays that share no longer one are slips of the pen."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +43,7 @@ class StepCounts:
         Args:
             delays: of the design, with the period of a controller that runs.
             longest: step that springs and motors allow, s.
-            step: the step asked for, s; the longest decimal one that divides all if None.
+            step: the step asked for, s; the longest that divides all if None.
 
         Raises:
             InputError: a delay varies or packets are lost, the step divides a delay or a period
@@ -52,22 +52,22 @@ class StepCounts:
         up, down, drive = (
             _constant(name, link)
             for name, link in (
-                ("central_up", delays.central.up),
-                ("central_down", delays.central.down),
-                ("embedded_down", delays.embedded.down),
+                ("way up of the central connection", delays.central.up),
+                ("way down of the central connection", delays.central.down),
+                ("way down of the embedded connection", delays.embedded.down),
             )
         )
         tick, look = _ticks(delays.sample_time), _ticks(delays.embedded_period)
         if look:
             up, down, drive = (math.ceil(hop / look) * look for hop in (up, down, drive))
         parts = {
-            "delay of the measurement": up,
-            "delay of the command": down + drive,
+            "delay of measurements": up,
+            "delay of commands": down + drive,
             "controller's period": tick,
         }
         common = math.gcd(*parts.values())
-        count = _decimal(math.ceil(common / _TICKS / min(longest, step or longest) - 1e-9))
-        fits = common / _TICKS / count
+        most = min(longest, step) if step is not None and step >= LEAST_STEP else longest
+        fits = _longest_step(common, most)
         if step is not None:
             _require_multiples(parts, step, fits, longest)
             fits = step
@@ -76,29 +76,28 @@ class StepCounts:
             raise InputError(
                 f"No step of {in_ms(LEAST_STEP)} or more divides all of {said}; round them."
             )
-        steps = (round(part / _TICKS / fits) for part in parts.values())
-        measurement, command, period = steps
+        measurement, command, period = (round(part / _TICKS / fits) for part in parts.values())
         return cls(step=fits, measurement=measurement, command=command, tick=period)
 
     @property
     def measurement_delay(self) -> float:
         """Delay of the sensors, s."""
-        return self.measurement * self.step
+        return round(self.measurement * self.step, 12)
 
     @property
     def command_delay(self) -> float:
         """Delay of the actuators, s."""
-        return self.command * self.step
+        return round(self.command * self.step, 12)
 
     @property
     def hold(self) -> float:
         """How long a command is held, s."""
-        return self.tick * self.step
+        return round(self.tick * self.step, 12)
 
     @property
     def total(self) -> float:
         """Largest age of the measurement behind a command at work, s."""
-        return (self.measurement + self.command + self.tick) * self.step
+        return round((self.measurement + self.command + self.tick) * self.step, 12)
 
 
 def _ticks(time: float) -> int:
@@ -114,9 +113,8 @@ def _constant(name: str, link: Link) -> int:
     if link.spread == 0.0:
         what = f"loses packets, {link.loss:g} of all"
     raise InputError(
-        f"The connection {name} {what}; a delay in a MuJoCo file is one number: give the worst "
-        f'case as {{ kind = "constant", value_ms = {late * 1e3:.9g} }}, or sealag simulate runs '
-        "the design as it is."
+        f"In [delays] the {name} {what}; a delay in a MuJoCo file is one constant number: give "
+        f'the worst case of each way, here {{ kind = "constant", value_ms = {late * 1e3:.9g} }}.'
     )
 
 
@@ -124,31 +122,29 @@ def _require_multiples(parts: dict[str, int], step: float, fits: float, longest:
     """Refuse a step that springs do not allow, or that does not divide a delay or period."""
     remedy = f"{in_ms(fits)} would do"
     if fits < LEAST_STEP:
-        remedy = "no step of 1 us or more would do: round the delays"
-    if not step > 0.0 or not math.isfinite(step):
-        raise InputError(f"The step is {in_ms(step)}; a positive one is needed.")
+        remedy = f"no step of {in_ms(LEAST_STEP)} or more would do: round the delays"
+    if not LEAST_STEP <= step < math.inf:
+        raise InputError(
+            f"The step is {in_ms(step)}; at least {in_ms(LEAST_STEP)} is needed, and {remedy}."
+        )
     if step > longest * (1.0 + 1e-9):
         raise InputError(
             f"The step of {in_ms(step)} is too long for the design's springs, which allow "
             f"{in_ms(longest)}; {remedy}."
         )
+    whole = _ticks(step)
     for name, part in parts.items():
-        whole = _ticks(step)
-        if not whole or part % whole:
-            rounded = math.ceil(part / max(whole, 1)) * max(whole, 1) / _TICKS
+        if part % whole:
+            rounded = in_ms(math.ceil(part / whole) * whole / _TICKS)
             raise InputError(
-                f"The {name}, {in_ms(part / _TICKS)}, is no multiple of the step {in_ms(step)}: "
-                f"MuJoCo would make it {in_ms(rounded)}; {remedy}."
+                f"The {name}, {in_ms(part / _TICKS)}, is no multiple of the step {in_ms(step)}, "
+                f"and would become {rounded} in MuJoCo; {remedy}."
             )
 
 
-def _decimal(count: int) -> int:
-    """The least number from a count on that divides a power of ten, so that steps stay decimal."""
-    while True:
-        rest = count
-        for factor in (2, 5):
-            while rest % factor == 0:
-                rest //= factor
-        if rest == 1:
-            return count
+def _longest_step(common: int, most: float) -> float:
+    """The longest step, s, up to one, that is a whole part of ticks; else one below LEAST_STEP."""
+    count = max(1, math.ceil(common / _TICKS / most - 1e-9))
+    while common % count and common >= count * LEAST_STEP * _TICKS:
         count += 1
+    return common / _TICKS / count
