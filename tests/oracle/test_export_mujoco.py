@@ -78,14 +78,54 @@ class TestMujocoItself:
         assert found == {4: pytest.approx(1 / 6), 5: pytest.approx(5 / 6)}
 
     def test_with_more_samples_than_steps_the_delay_jumps(self):
-        def lags(samples):
-            late = f'delay="0.012" nsample="{samples}"'
+        def lags(samples, delay=0.012):
+            late = f'delay="{delay}" nsample="{samples}"'
             text = JOINT.format(step=STEP, integrator="Euler", late=late)
             return _lags(mujoco.MjModel.from_xml_string(text), 20_000)
 
         assert lags(12) == [12]
         assert lags(13) == [12, 13]
         assert lags(16) == [12, 13]
+        assert lags(16, delay=0.0115) == [12]
+
+    def test_a_position_servo_s_own_feedback_is_not_late(self):
+        """The same attribute is a command delay there: only the target waits."""
+        servo = '<position joint="j" kp="30" kv="2" delay="0.005" nsample="5"/>'
+        text = JOINT.format(step=STEP, integrator="Euler", late="")
+        model = mujoco.MjModel.from_xml_string(text.replace('<motor joint="j" />', servo))
+        data = mujoco.MjData(model)
+        data.qpos[0], data.qvel[0] = 0.1, 0.5
+        for k in range(20):
+            data.ctrl[0] = 0.2 * k
+            target = 0.2 * max(k - 5, 0)
+            own = -30.0 * data.qpos[0] - 2.0 * data.qvel[0]
+            mujoco.mj_step(model, data)
+            assert data.actuator_force[0] == pytest.approx(30.0 * target + own, abs=1e-12)
+
+    def test_sensordata_is_of_the_step_s_beginning(self):
+        text = JOINT.format(step=STEP, integrator="Euler", late="")
+        text = text.replace("</mujoco>", '<sensor><jointpos joint="j"/></sensor></mujoco>')
+        model = mujoco.MjModel.from_xml_string(text)
+        data = mujoco.MjData(model)
+        data.qvel[0] = 1.0
+        for _ in range(9):
+            before = data.qpos[0]
+            mujoco.mj_step(model, data)
+            assert data.sensordata[0] == before != data.qpos[0]
+        mujoco.mj_step1(model, data)
+        assert data.sensordata[0] == data.qpos[0]
+
+    def test_after_a_reset_no_command_has_been_given(self):
+        late = 'delay="0.003" nsample="3"'
+        model = mujoco.MjModel.from_xml_string(
+            JOINT.format(step=STEP, integrator="Euler", late=late)
+        )
+        data, forces = mujoco.MjData(model), []
+        data.ctrl[0] = 2.0
+        for _ in range(5):
+            mujoco.mj_step(model, data)
+            forces.append(data.actuator_force[0])
+        assert forces == [0.0, 0.0, 0.0, 2.0, 2.0]
 
 
 def _sliding(folder):

@@ -198,8 +198,9 @@ def test_what_is_left_out_is_said(tmp_path):
         system.robot.joints, spring_stiffness=300.0, rotor_inertia=0.1, motor_damping=9.0
     )
     assert mujoco_model(replace(system, actuators=free)).left_out == ()
-    falling = replace(sealag.load("bundled:hume"), delays=constant_delays(0.002, 0.002))
-    assert "no rest: no contact force balances" in " ".join(mujoco_model(falling).left_out)
+    hume, prompt = sealag.load("bundled:hume"), constant_delays(0.002, 0.002)
+    falling = replace(hume, delays=prompt, contacts=())
+    assert "no rest: the base floats" in " ".join(mujoco_model(falling).left_out)
 
 
 def test_the_program_mujoco_is_not_needed(tmp_path, monkeypatch):

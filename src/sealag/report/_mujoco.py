@@ -25,14 +25,14 @@ STEPS_PER_RADIAN = 1.25
 and leaves its first-order error where delays do not see it."""
 
 _NOTHING = 1e-14
-"""kg, kg m²: mass and inertia of a rotor's body, whose armature is the inertia. MuJoCo refuses
-less than 1e-15; ten thousand times more would show in the smallest rotor that a project may have."""
+"""kg, kg m²: mass and inertia of a rotor's body; the armature is the rest of its inertia. MuJoCo
+refuses less than 1e-15; the smallest rotor of a project has 1e-13."""
 
 _ABOUT = """
-Written by sealag export. One rotor and one spring for each joint; the keyframe is where the loop rests.
+Written by sealag export. One rotor and one spring for each joint; the loop rests at the keyframe.
 {delays}
-Every step: mj_step1; where the steps so far are a multiple of {tick}, read sensordata, which mj_step1
-has made, and write ctrl; mj_step2. After mj_step sensordata is one step older than the state.
+Every step: mj_step1; where the steps so far are a multiple of {tick}, read sensordata, which
+mj_step1 has made, and write ctrl; mj_step2. After a whole mj_step sensordata is a step older.
  - nsample is the delay in steps, not more: with more samples rounding of the time makes the delay
    jump between two steps. With fewer it is shorter.
  - Before the first command has arrived, ctrl is 0: fill the past with mj_initCtrlHistory.
@@ -118,7 +118,7 @@ def mujoco_model(system: System, *, step: float | None = None) -> MujocoModel:
     late = _late(steps.command_delay, steps.command)
     motors = SubElement(file, "actuator")
     for name in drives.joints:
-        SubElement(motors, "motor", name=name, joint=_rotor(name), **late)
+        SubElement(motors, "motor", {"name": name, "joint": _rotor(name), **late})
     late = _late(steps.measurement_delay, steps.measurement)
     _sensors(system, SubElement(file, "sensor"), late)
     SubElement(file, "keyframe").append(_key(system, order, rest))
@@ -207,7 +207,8 @@ def _links(system: System, world: Element) -> list[str]:
 
     def write(j: int, parent: Element) -> None:
         name = _joint_name(system, j)
-        body = SubElement(parent, "body", name=name, **_place(tree.rotation[j], tree.position[j]))
+        at = _place(tree.rotation[j], tree.position[j])
+        body = SubElement(parent, "body", {"name": name, **at})
         I = tree.inertia[j]
         SubElement(
             body, "inertial", mass=repr(float(tree.mass[j])), pos=_numbers(tree.lever[j]),
@@ -226,7 +227,7 @@ def _links(system: System, world: Element) -> list[str]:
         for f, contact in enumerate(system.contacts):
             if mounts.joint[f] == j:
                 at = _place(mounts.rotation[f], mounts.position[f])
-                SubElement(body, "site", name=f"contact {contact.frame}", **at)
+                SubElement(body, "site", {"name": f"contact {contact.frame}", **at})
         for child in np.flatnonzero(tree.parent == j):
             if child > j:
                 write(int(child), body)
@@ -246,12 +247,12 @@ def _rotors(system: System, world: Element) -> None:
         nothing = repr(_NOTHING)
         SubElement(body, "inertial", pos="0 0 0", mass=nothing, diaginertia=" ".join([nothing] * 3))
         values = {
-            "armature": drives.shaped_inertia[i],
+            "armature": drives.shaped_inertia[i] - _NOTHING,
             "damping": drives.motor_damping[i] + shaping[i] * drives.viscous_friction[i],
             "frictionloss": shaping[i] * drives.coulomb_friction[i],
         }
         text = {key: repr(float(value)) for key, value in values.items()}
-        SubElement(body, "joint", name=_rotor(name), axis="0 0 1", **text)
+        SubElement(body, "joint", {"name": _rotor(name), "axis": "0 0 1", **text})
 
 
 def _springs(system: System, tendon: Element) -> None:
@@ -271,7 +272,7 @@ def _contacts(system: System, world: Element, equality: Element) -> None:
     for contact in system.contacts:
         rotation, position = system.robot.frame_placement(contact.frame, system.posture)
         anchor, site = f"ground {contact.frame}", f"contact {contact.frame}"
-        SubElement(world, "site", name=anchor, **_place(rotation, position))
+        SubElement(world, "site", {"name": anchor, **_place(rotation, position)})
         SubElement(
             equality, "connect" if contact.kind is ContactKind.POINT else "weld",
             name=site, site1=site, site2=anchor, solref="-2500 -100", solimp="0.9999 0.9999 0.001",

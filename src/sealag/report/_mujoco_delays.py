@@ -14,7 +14,7 @@ takes 1/3 ms, written with nine digits, for a multiple of 1 ns; a hundred times 
 rounding of 5 s."""
 
 LEAST_STEP = 1e-6
-"""s; as short as simulation.physics_step_ms may be. Delays that share no longer one are slips of the pen."""
+"""s; as short as simulation.physics_step_ms may be. Delays that share no longer one are a slip."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
