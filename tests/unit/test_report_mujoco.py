@@ -57,6 +57,8 @@ def test_stiff_springs_shorten_the_step_to_a_decimal_one(tmp_path):
         (0.002, 0.003)
     )
     _refused(system, "1 ms", "too long for the design's springs", "would do", step=1e-3)
+    hard = arm_system(tmp_path, delays=delays, springs={"spring_stiffness": 1e12})
+    _refused(hard, "springs allow steps of", "shorter than 0.001 ms", "softer springs")
 
 
 def test_a_step_that_divides_no_delay_is_refused_with_one_that_does(tmp_path):

@@ -46,9 +46,14 @@ class StepCounts:
             step: the step asked for, s; the longest that divides all if None.
 
         Raises:
-            InputError: a delay varies or packets are lost, the step divides a delay or a period
-                not, or only a step shorter than LEAST_STEP would.
+            InputError: a delay varies or packets are lost, the step does not divide a delay or the
+                period, or a step would have to be shorter than LEAST_STEP.
         """
+        if longest < LEAST_STEP:
+            raise InputError(
+                f"The springs allow steps of {in_ms(longest)}, shorter than {in_ms(LEAST_STEP)}; "
+                "give softer springs, or heavier rotors or links."
+            )
         up, down, drive = (
             _constant(name, link)
             for name, link in (
