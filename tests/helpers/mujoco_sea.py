@@ -125,7 +125,8 @@ def model_xml(
         f'joint="rotor_{name}" coef="1"/><joint joint="{name}" coef="-1"/></fixed>'
         for i, name in enumerate(robot.joints)
     )
-    late = f'delay="{delay}" nsample="{round(delay / step) + 4}" interp="zoh"' if delay > 0 else ""
+    # With more samples rounding of the time would let the delay jump by a step.
+    late = f'delay="{delay}" nsample="{round(delay / step)}" interp="zoh"' if delay > 0 else ""
     motors = "".join(f'<motor joint="rotor_{name}" {late}/>' for name in robot.joints)
     anchors = "".join(f'<site name="anchor_{f}" pos="9 9 {9 + k}"/>' for k, f in enumerate(feet))
     held = "".join(
