@@ -16,6 +16,7 @@ from fuzz.mutate import mutated, mutated_urdf
 from helpers.toml import to_toml
 from sealag.design import local_margins
 from sealag.errors import SealagError
+from sealag.report import mujoco_model
 
 ROOT = Path(__file__).resolve().parents[2]
 CASES = ROOT / "tests" / "data" / "cases"
@@ -97,6 +98,7 @@ def _stages(path: Path):
         yield "certify", lambda: sealag.certify(system)
         yield "margin", lambda: local_margins(system)
         yield "simulate", lambda: sealag.simulate(system, duration=0.05)
+        yield "export", lambda: mujoco_model(system)
 
 
 def tried(path: Path, seed: int) -> Finding | None:

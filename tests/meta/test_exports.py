@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from helpers.source import ROOT, exported, imported, modules, tree
 
-MOST = 137
+MOST = 139
 """Names of all rooms together; the aim is 90."""
 FOR_TESTS = {"sealag.design.Along", "sealag.design.local_of", "sealag.design.parse_project"}
 """What tests ask and no user does: bounds that are wrong on purpose, and the schema's types."""

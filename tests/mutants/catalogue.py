@@ -48,6 +48,7 @@ TESTS = {
              "tests/oracle/test_robot_mimic.py tests/unit/test_design_cases.py",
     "files": "tests/unit/test_files.py tests/unit/test_report_mcap.py "
              "tests/cli/test_cli_outputs.py",
+    "report": "tests/unit/test_report_mujoco.py tests/oracle/test_export_mujoco.py",
     "cli": "tests/cli/test_cli_terminal.py tests/cli/test_cli_status.py "
            "tests/cli/test_cli_certify.py tests/cli/test_cli_simulate.py",
     "units": "tests/unit/test_units.py tests/unit/test_design_starter.py",
@@ -547,6 +548,26 @@ MUTANTS = [
          "Ctrl-C while recording"),
         ("nanoseconds = round(stamp * 1e9)", "nanoseconds = int(stamp * 1e9)",
          "times of messages, by a nanosecond"),
+    ),
+    *_of(
+        "report", "report/_mujoco_delays.py",
+        ("if link.constant:", "if True:", "delays that vary, in MuJoCo"),
+        ("math.ceil(hop / look) * look", "hop", "looks of receivers, in MuJoCo"),
+        ('"delay of commands": down + drive', '"delay of commands": down',
+         "the way down to the drives, in MuJoCo"),
+        ("if part % whole:", "if False:", "delays that MuJoCo rounds up"),
+        ("if step > longest * (1.0 + 1e-9):", "if False:", "steps that springs do not allow"),
+    ),
+    *_of(
+        "report", "report/_mujoco.py",
+        ('"nsample": str(count)', '"nsample": str(count + 1)', "a sample more than steps"),
+        ("shaping[i] * drives.viscous_friction[i]", "drives.viscous_friction[i]",
+         "friction of a shaped rotor, in MuJoCo"),
+        ("[*q[:3], q[6], *q[3:6]]", "[*q[:3], *q[3:7]]", "order of a quaternion, in MuJoCo"),
+        ("if system.late_joints:", "if False:", "late torque feedback, in MuJoCo"),
+        ("damping=repr(float(robot.damping[robot.joint_index(name)]))", 'damping="0"',
+         "damping of bearings, in MuJoCo"),
+        ("np.hypot(link_rate, motor_rate)", "link_rate", "steps of rotors on stiff springs"),
     ),
     *_of(
         "cli", "cli/_terminal.py",

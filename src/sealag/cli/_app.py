@@ -261,6 +261,34 @@ def simulate(
 
 
 @app.command()
+def export(
+    project: Project,
+    target: Annotated[
+        str, typer.Option("--for", help="Simulator to write for; there is mujoco.")
+    ] = "mujoco",
+    step_ms: Annotated[
+        float | None,
+        typer.Option(
+            "--step-ms",
+            help="Time step. Default: the longest that divides delays and period and that the "
+            "springs allow, at most 1 ms.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="File to write; its folder is made if needed. Default: PROJECT.xml."
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write robot, springs, drives and delays for another simulator, so that delays are exact."""
+    from sealag.cli._export import export_project
+
+    export_project(project, target, step_ms=step_ms, out=out, as_json=as_json)
+
+
+@app.command()
 def paper(
     project: Annotated[
         str, typer.Argument(help="Project file of Hume with a [walking] section.")

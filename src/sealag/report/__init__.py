@@ -1,12 +1,15 @@
-"""Recordings of runs as MCAP files."""
+"""Recordings of runs as MCAP files, and designs as models of MuJoCo."""
 
 from sealag.report._mcap import McapRecorder
 from sealag.report._mcap_reader import read_recording
+from sealag.report._mujoco import MujocoModel, mujoco_model
 from sealag.report._recording import write_run
 from sealag.report._summary import run_summary
 
 __all__ = [
     "McapRecorder",
+    "MujocoModel",
+    "mujoco_model",
     "read_recording",
     "run_summary",
     "write_run",
