@@ -50,6 +50,26 @@ def test_a_motion_has_the_smallest_of_its_instants():
     assert max(alone) > 1.01 * min(alone)
 
 
+def test_a_long_motion_has_at_least_its_passive_bound():
+    """Bounds that differ by little: a hundred instants are computed, and the next bound answers."""
+    one = sealag.load(EXAMPLES.parent / "tests" / "data" / "cases" / "s7_static_joint_gravity.toml")
+    count = 130
+    motion = Motion(
+        time=1e-3 * np.arange(count), q=1e-4 * np.arange(count)[:, None], v=np.zeros((count, 1)),
+        contact_sets=((),), contact_index=np.zeros(count, dtype=int),
+    )  # fmt: skip
+    found = local_margins(one, motion)
+    smallest = passive(one, motion)
+    assert smallest <= found.jitter_s <= found.delay_s
+    whole = jitter_margin_of(one, motion, range(0, count, 10))
+    assert found.jitter_s <= whole * (1.0 + 1e-9)
+    assert found.jitter_s == pytest.approx(whole, rel=0.05)
+
+
+def jitter_margin_of(system, motion, instants):
+    return min(local_margins(system, motion.at(slice(k, k + 1))).jitter_s for k in instants)
+
+
 def test_what_falls_without_delay_has_none():
     system = sealag.load("bundled:hume")
     found = local_margins(system, half_a_step(system))

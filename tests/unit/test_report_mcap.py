@@ -101,10 +101,10 @@ def test_names_and_numbers_that_json_spells_otherwise(tmp_path):
 def test_damage_ends_a_recording_or_is_told(tmp_path):
     """A changed byte gives what lies before it, or a FileError; never a changed number."""
     path, damaged = tmp_path / "run.mcap", tmp_path / "damaged.mcap"
-    _write(path, count=3000)
+    _write(path, count=1000)
     good, whole = path.read_bytes(), read_recording(path).signals
     rng = np.random.default_rng(5)
-    spots = [*rng.integers(5, len(good), 40), *(len(good) - rng.integers(1, 2000, 80))]
+    spots = [*rng.integers(5, len(good), 12), *(len(good) - rng.integers(1, 2000, 24))]
     seen = set()
     for spot, byte in zip(spots, rng.integers(0, 256, len(spots))):
         damaged.write_bytes(good[:spot] + bytes([byte]) + good[spot + 1 :])

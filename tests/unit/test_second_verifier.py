@@ -163,7 +163,7 @@ def test_it_runs_as_a_file_and_by_the_command(tmp_path, capsys):
         assert err.count("\n") == 1
     code, _, err = command(tmp_path / "none.json")
     assert (code, err.count("none.json")) == (2, 1)
-    assert "is not a certificate: No such file or directory." in err
+    assert "cannot be read: No such file or directory." in err
     code, _, err = command(path, "--exact")
     assert code == 2
     assert "--second takes no --exact" in err
