@@ -21,15 +21,16 @@ LONGEST_STEP = 1e-3
 """s; MuJoCo's integrators are of first order: a step ten times longer shows in every joint."""
 
 STEPS_PER_RADIAN = 1.25
-"""Of the fastest spring. Semi-implicit integration is stable above 0.5; ten times more costs time,
-and leaves its first-order error where delays do not see it."""
+"""In the time 1/ω of the fastest spring. Semi-implicit integration is stable above 0.5: with a
+tenth the springs diverge; ten times more costs ten times the steps."""
 
 _NOTHING = 1e-14
 """kg, kg m²: mass and inertia of a rotor's body; the armature is the rest of its inertia. MuJoCo
 refuses less than 1e-15; the smallest rotor of a project has 1e-13."""
 
 _ABOUT = """
-Written by sealag export. One rotor and one spring for each joint; the loop rests at the keyframe.
+Written by sealag export, for MuJoCo 3.5 or newer. Each joint has a rotor and a spring; the loop
+rests at the keyframe.
 {delays}
 Every step: mj_step1; where the steps so far are a multiple of {tick}, read sensordata, which
 mj_step1 has made, and write ctrl; mj_step2. After a whole mj_step sensordata is a step older.
