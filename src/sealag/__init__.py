@@ -26,8 +26,7 @@ _HOME = {
     "Contact": "sealag.robot",
     "Motion": "sealag.robot",
     "load_robot": "sealag.robot",
-    "actuators": "sealag.actuation",
-    "actuators_of": "sealag.actuation",
+    "Actuators": "sealag.actuation",
     "write_certificate": "sealag.passivity",
     "Link": "sealag.delay",
     "RoundTrip": "sealag.delay",
@@ -38,6 +37,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Actuators",
     "Constant",
     "Contact",
     "Controller",
@@ -56,8 +56,6 @@ __all__ = [
     "Tank",
     "Task",
     "__version__",
-    "actuators",
-    "actuators_of",
     "certify",
     "load",
     "load_motion",
@@ -68,7 +66,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from sealag.actuation import actuators, actuators_of
+    from sealag.actuation import Actuators
     from sealag.delay import Constant, Delays, Link, RoundTrip, Sinusoid
     from sealag.design import System, certify, load, load_motion, simulate, verify_design
     from sealag.errors import SealagError

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.actuation import Actuators, actuators
+from sealag.actuation import Actuators
 from sealag.errors import InputError
 from sealag.typing import Array
 from sealag.whole_body import (
@@ -146,7 +146,7 @@ def _plant(rng: np.random.Generator, n: int, *, kind: StiffnessForm, signal: Sig
     F = signal.motor_stiffness(F_q, K)
     if kind is not StiffnessForm.PUBLISHED:
         F = (F + F.T) / 2.0
-    drives = actuators(
+    drives = Actuators.of(
         [f"joint{i}" for i in range(n)], spring_stiffness=K, rotor_inertia=B_s, motor_damping=D
     )
     loop = _frozen_loop(M, G, drives, F=F, links=not signal.has_potential)

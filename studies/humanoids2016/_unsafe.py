@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.margin import DelayMargin, delay_margin
 from sealag.passivity import Instant, Problem, max_delay, solve
 from sealag.typing import Array
@@ -56,7 +56,7 @@ def delayed_margin(
         link_feedback: whether the link angle is fed back instead of the motor angle.
     """
     names = [f"joint{i}" for i in range(len(K))]
-    drives = actuators(names, spring_stiffness=K, rotor_inertia=B_s, motor_damping=D)
+    drives = Actuators.of(names, spring_stiffness=K, rotor_inertia=B_s, motor_damping=D)
     none = np.zeros_like(F)
     C_z, C_theta = (-F, none) if link_feedback else (none, -F)
     loop = sea_loop(drives, M=M, H=none, S=np.eye(len(K)), C_z=C_z, C_theta=C_theta)

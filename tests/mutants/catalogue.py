@@ -152,9 +152,9 @@ MUTANTS = [
     ),
     *_of(
         "actuation", "actuation/_actuators.py",
-        ("ratio=own(actuators.rotor_inertia / actuators.shaped_inertia)",
-         "ratio=own(actuators.shaped_inertia / actuators.rotor_inertia)", "shaping upside down"),
-        ("viscous=own(actuators.viscous_friction)", "viscous=own(0.0)", "viscous friction"),
+        ("ratio=own(self.rotor_inertia / self.shaped_inertia)",
+         "ratio=own(self.shaped_inertia / self.rotor_inertia)", "shaping upside down"),
+        ("viscous=own(self.viscous_friction)", "viscous=own(0.0)", "viscous friction"),
         ("bearing=own(joint_damping)", "bearing=own(0.0)", "damping of the links' bearings"),
         ("moving = np.where(robot.velocity_limit > 0.0, robot.velocity_limit, np.inf)",
          "moving = robot.velocity_limit", "a speed limit of 0"),

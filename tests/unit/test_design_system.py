@@ -8,7 +8,7 @@ import pytest
 
 import sealag
 from helpers.small_systems import arm, arm_system, constant_delays, joint_task
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.design import System, load, local_margins, margin_of
 from sealag.errors import InputError, UnknownNameError
 from sealag.robot import Contact, Motion, load_robot
@@ -99,7 +99,7 @@ embedded_round_trip = { kind = "constant", value_ms = 2.0 }
 
 def test_hume_in_fifteen_lines():
     robot = load_robot("bundled:hume.urdf", floating_base=True)
-    drives = actuators(
+    drives = Actuators.of(
         robot.joints, spring_stiffness=1500.0, rotor_inertia=0.1, motor_damping=40.0,
         torque_limit=100.0,
     )  # fmt: skip
@@ -137,7 +137,7 @@ def test_a_motion_s_instants_have_loops_of_their_own(system):
 
 def test_parts_that_do_not_fit_are_refused_in_a_sentence(tmp_path, system):
     robot = system.robot
-    other = actuators(
+    other = Actuators.of(
         ("elbow", "wrist"), spring_stiffness=300.0, rotor_inertia=0.1, motor_damping=10.0
     )
     with pytest.raises(InputError, match=r"elbow, wrist, the robot's joints are joint0, joint1"):

@@ -10,7 +10,7 @@ from helpers.chains import Damped, chain, planar_arm, wheel
 from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD
 from helpers.designs import EXAMPLES
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.design import load, simulate
 from sealag.errors import InputError
 from sealag.simulation import Clock, Outcome, closed_loop, fastest_link
@@ -18,7 +18,7 @@ from sealag.simulation import Clock, Outcome, closed_loop, fastest_link
 
 def _springs(robot, **changes):
     values = {"spring_stiffness": 350.0, "rotor_inertia": 0.1, "motor_damping": 1.0}
-    return actuators(robot.joints, **{**values, **changes})
+    return Actuators.of(robot.joints, **{**values, **changes})
 
 
 @pytest.mark.parametrize("damping", [0.0, 3.0, 60.0])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from helpers.chains import wheel
 from helpers.controllers import JointPD
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import (
     Constant,
     Delays,
@@ -152,7 +152,7 @@ class _Recorder(JointPD):
 
 def _run(folder, delays, physics):
     robot = wheel(folder)
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0,
         inertia_shaping=0.5,
     )  # fmt: skip

@@ -11,7 +11,7 @@ import pytest
 
 from helpers.chains import planar_arm
 from helpers.designs import EXAMPLES
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.design import load
 from sealag.errors import ContractionError, InputError, UnknownNameError
 from sealag.robot import Contact
@@ -332,11 +332,11 @@ def test_it_is_both_protocols_and_runs_without_the_simulator():
     assert controller is not None
     program = """
 import sys, numpy as np
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.robot import load_robot
 from sealag.whole_body import Controller, Law, Measurement, Task, TaskKind
 robot = load_robot("bundled:hume", floating_base=True)
-motors = actuators(robot.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
+motors = Actuators.of(robot.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
 task = Task(name="com", kind=TaskKind.COM, stiffness=100.0)
 posture = robot.configuration(np.full(robot.n, 0.2), base_position=(0, 0, 0.9))
 controller = Controller(robot, Law(tasks=(task,)), motors, posture=posture)
@@ -393,7 +393,7 @@ def growth(controller, robot, ticks):
 @pytest.mark.parametrize("signal", SIGNAL_NAMES)
 def test_memory_stays_flat(tmp_path, signal):
     arm = planar_arm(tmp_path, count=2, mass=1.0, inertia=0.05, length=0.4)
-    motors = actuators(arm.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
+    motors = Actuators.of(arm.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
     task = Task(name="end", kind=TaskKind.POSITION, frame="link1", axes=(0, 1), stiffness=20.0)
     law = Law(tasks=(task,), signal=signal_named(signal))
     controller = Controller(arm, law, motors, posture=np.array([0.4, 0.6]))
@@ -417,7 +417,7 @@ def test_too_soft_springs_are_refused_at_the_first_tick(signal):
     robot, measured, out = BAXTER.robot, at_posture(BAXTER), np.zeros(BAXTER.robot.n)
     factor = certified(BAXTER, ()).contraction[0] * BAXTER.actuators.spring_stiffness[0]
     for share, fails in ((1.01, False), (0.99, True)):
-        motors = actuators(
+        motors = Actuators.of(
             robot.joints, spring_stiffness=share * factor, rotor_inertia=0.1, motor_damping=1.0
         )
         controller = build(BAXTER, (), motors=motors, signal=signal_named(signal))

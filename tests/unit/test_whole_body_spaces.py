@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from helpers.designs import EXAMPLES
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.design import certified_bounds, load
 from sealag.robot import Contact, ContactKind, Motion
 from sealag.whole_body import (
@@ -151,7 +151,7 @@ def test_contraction_and_asymmetry_are_those_of_what_is_fed_back():
 
 def test_static_feedback_without_contraction_has_no_bound():
     """And where the law is exactly as stiff as its springs, no stiffness either."""
-    soft = actuators(
+    soft = Actuators.of(
         BAXTER.robot.joints, spring_stiffness=5.0, rotor_inertia=0.1, motor_damping=1.0
     )
     law = replace(BAXTER.law, signal=StaticJoint(), gravity=GravityCompensation.NONE)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sealag.actuation import Actuators, actuators_of
+from sealag.actuation import Actuators
 from sealag.delay import (
     Constant,
     Delays,
@@ -269,7 +269,7 @@ def _actuators(section: Any, robot: Robot, path: Path) -> Actuators:
         columns[key] = [values[key] for values in every]
     for key in optional:
         columns[key] = [values.get(key, _left_out(key)) for values in every]
-    return actuators_of(robot, **columns)
+    return Actuators.of_robot(robot, **columns)
 
 
 def _left_out(key: str) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sealag.actuation import Actuators, motors_of
+from sealag.actuation import Actuators
 from sealag.errors import InputError
 from sealag.kernels import keep
 from sealag.kernels.ledger import IMPACT
@@ -104,7 +104,7 @@ class Plant:
         )  # fmt: skip
         self.contacts, mounts = self.surroundings.contacts, self.surroundings.mounts
         self.time = 0.0
-        motors = motors_of(actuators, robot.damping)
+        motors = actuators.motors(robot.damping)
         parts = contact.Plant(robot.tree, mounts, motors, self.contacts)
         physics = plant.allocate_physics(parts, instant=not delayed_torque_feedback)
         self.now, self._next, self.held = physics.now, physics.following, physics.held

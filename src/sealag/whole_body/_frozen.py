@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sealag.actuation import Actuators, motors_of
+from sealag.actuation import Actuators
 from sealag.robot import Contact, Robot
 from sealag.typing import Array
 from sealag.whole_body._evaluation import LawEvaluation
@@ -333,7 +333,7 @@ def _motor_rows(actuators: Actuators, *, instant: bool) -> _MotorRows:
     from sealag.kernels.motor import rate_rows
 
     speed, torque = np.zeros((2, 6, actuators.n))
-    rate_rows(tuple(motors_of(actuators)), instant, speed, torque)
+    rate_rows(tuple(actuators.motors()), instant, speed, torque)
     ratio = actuators.rotor_inertia / actuators.shaped_inertia
     return _MotorRows(
         speed=speed[:5],
