@@ -7,15 +7,7 @@ import numpy as np
 from sealag.actuation import Actuators
 from sealag.errors import InputError
 from sealag.typing import Array
-from sealag.whole_body import (
-    SIGNAL_NAMES,
-    FrozenLoop,
-    GravityCompensation,
-    Signal,
-    StiffnessForm,
-    sea_loop,
-    signal_named,
-)
+from sealag.whole_body import FrozenLoop, GravityCompensation, Signal, StiffnessForm
 
 _SYMMETRIC = 1e-9
 
@@ -112,7 +104,7 @@ def random_sea_plant(
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 7))
     drawn_form = StiffnessForm(rng.choice(list(StiffnessForm)))
-    drawn_signal = SIGNAL_NAMES[rng.integers(len(SIGNAL_NAMES))]
+    drawn_signal = Signal.names()[rng.integers(len(Signal.names()))]
     if joints is not None:
         n = joints
     if n < 1:
@@ -123,7 +115,7 @@ def random_sea_plant(
         raise InputError(f"{problem}.") from None
     chosen = drawn_signal if signal is None else signal
     return _plant(
-        rng, n, kind=kind, signal=signal_named(chosen) if isinstance(chosen, str) else chosen
+        rng, n, kind=kind, signal=Signal.named(chosen) if isinstance(chosen, str) else chosen
     )
 
 
@@ -173,4 +165,4 @@ def _task_stiffness(kind: StiffnessForm, Lambda: Array, K_x: Array) -> Array:
 def _frozen_loop(M: Array, G: Array, drives: Actuators, *, F: Array, links: bool) -> FrozenLoop:
     none = np.zeros_like(F)
     C_z, C_theta = (-F, none) if links else (none, -F)
-    return sea_loop(drives, M=M, H=G, S=np.eye(len(F)), C_z=C_z, C_theta=C_theta)
+    return FrozenLoop.of_links(drives, M=M, H=G, S=np.eye(len(F)), C_z=C_z, C_theta=C_theta)

@@ -8,7 +8,7 @@ import pytest
 
 from helpers.certificates import half_a_step
 from helpers.designs import EXAMPLES
-from sealag.design import load, save_motion
+from sealag.design import load
 from sealag.passivity import write_certificate
 
 HELD = EXAMPLES / "hume_held.toml"
@@ -55,7 +55,7 @@ def test_refusals_compile_nothing(fresh, tmp_path, cli):
     out, bad, walk = tmp_path / "c.json", tmp_path / "bad.toml", tmp_path / "walk.csv"
     bad.write_text(HELD.read_text().replace("[delays]", "[delay]"))
     hume = load("bundled:hume")
-    save_motion(half_a_step(hume), hume.robot, walk)
+    hume.save_motion(half_a_step(hume), walk)
     text = walk.read_text()
     walk.write_text(text[: len(text) // 2].rpartition(",")[0] + ",nothing\n")
     for command in (

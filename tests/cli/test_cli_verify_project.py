@@ -9,7 +9,7 @@ import sealag
 from helpers.certificates import half_a_step, made, plain, resealed
 from helpers.designs import EXAMPLES
 from sealag.cli import main
-from sealag.design import save_motion, verify_design
+from sealag.design import verify_design
 from sealag.passivity import verify, write_certificate
 
 BAXTER = EXAMPLES / "baxter.toml"
@@ -126,7 +126,7 @@ def test_the_command(tmp_path, capsys):
     assert code == 1
     assert "BAD  design: delay_s" in text
     system, walk = design("moving")
-    save_motion(walk, system.robot, motion)
+    system.save_motion(walk, motion)
     write_certificate(sealag.certify(system, walk), out)
     assert run(out, "--project", "bundled:hume", "--motion", motion)[0] == 0
     code, _, err = run(out, "--project", "bundled:hume")

@@ -14,7 +14,6 @@ from random import Random
 import sealag
 from fuzz.mutate import mutated, mutated_urdf
 from helpers.toml import to_toml
-from sealag.design import local_margins
 from sealag.errors import SealagError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -95,7 +94,7 @@ def _stages(path: Path):
     yield "load", load
     if system is not None:
         yield "certify", lambda: sealag.certify(system)
-        yield "margin", lambda: local_margins(system)
+        yield "margin", lambda: system.local_margins()
         yield "simulate", lambda: sealag.simulate(system, duration=0.05)
 
 

@@ -15,7 +15,7 @@ from sealag.design import System
 from sealag.errors import CertificateError
 from sealag.passivity import verify, write_certificate
 from sealag.robot import Motion
-from sealag.walking import GroundProfile, plan_walk, walk_motion
+from sealag.walking import GroundProfile, WalkPlan
 from sealag.whole_body import MotorAngles, Tank
 
 
@@ -65,7 +65,7 @@ def made(name: str) -> dict[str, Any]:
 
 def half_a_step(system: System) -> Motion:
     """Forty instants of Hume's walk."""
-    whole = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=2), rate=100.0)
+    whole = WalkPlan.over(GroundProfile.paper(), steps=2).motion(system.robot, rate=100.0)
     return whole.at(slice(0, 40))
 
 

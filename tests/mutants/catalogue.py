@@ -13,7 +13,8 @@ TESTS = {
            "tests/unit/test_whole_body_rest.py tests/unit/test_whole_body_tank.py "
            "tests/unit/test_whole_body_controller.py tests/unit/test_design_cases.py "
            "tests/oracle/test_black_box_corpus.py",
-    "margin": "tests/unit/test_margin_delay_margin.py tests/unit/test_margin_slow_crossings.py "
+    "margin": "tests/unit/test_margin_delay_margin.py tests/unit/test_design_drift.py "
+              "tests/unit/test_margin_slow_crossings.py "
               "tests/unit/test_margin_embedded_delay.py tests/unit/test_margin_at_most.py "
               "tests/unit/test_margin_bad_input.py tests/oracle/test_margin_known_systems.py "
               "tests/property/test_margin_never_exceeded.py",
@@ -181,7 +182,8 @@ MUTANTS = [
          "F_task = J_star.transpose(0, 2, 1) @ S @ J_star", "plain task errors"),
         ("contraction=static_contraction(F_q, K)", "contraction=static_contraction(F_task, K)",
          "contraction with fed-back gravity"),
-        ("asymmetry=relative_asymmetry(F_theta)", "asymmetry=relative_asymmetry(F_q)",
+        ("asymmetry=Spaces.relative_asymmetry(F_theta)",
+         "asymmetry=Spaces.relative_asymmetry(F_q)",
          "asymmetry on the motors' side"),
         ("lost |= (here < _ranks(robot, there, levels)).any(axis=1)",
          "lost |= (here < _ranks(robot, there, levels)).all(axis=1)", "singular postures"),
@@ -202,7 +204,7 @@ MUTANTS = [
     ),
     *_of(
         "law", "whole_body/_links.py",
-        ("out -= self._at.frame_jacobian(contact.frame)[: last - first].T @ force[first:last]",
+        ("out -= at.frame_jacobian(contact.frame)[: last - first].T @ force[first:last]",
          "first = last; continue", "contact forces in the links' stiffness"),
         ("H = others @ ((H + H.T) / 2.0) @ others", "H = (H + H.T) / 2.0", "rigid motions"),
         ("G[3:6, 3] = R.T[:, 2]", "G[3:6, 3] = R[:, 2]",
@@ -219,8 +221,8 @@ MUTANTS = [
          "damping of the links' bearings"),
         ("S.T @ (spring - drag) - at.take(at.z, H)", "S.T @ (spring - drag)",
          "stiffness of gravity and contacts"),
-        ("A_e=np.zeros_like(A_0) if embedded_delay is None else B @ (rows.shift[:, None] * spring)",
-         "A_e=np.zeros_like(A_0)", "late torque feedback"),
+        ("A_e = B @ (rows.shift[:, None] * spring) if late else np.zeros_like(A_0)",
+         "A_e = np.zeros_like(A_0)", "late torque feedback"),
         ("A_0[at.memory, at.theta_rate] = memory.B_rate", "pass", "x̂ that moves with the motors"),
         ("shift=(1.0 - ratio) / ratio", "shift=1.0 - ratio", "gain of late torque feedback"),
     ),
@@ -244,6 +246,8 @@ MUTANTS = [
     ),
     *_of(
         "margin", "margin/_margin.py",
+        ("drifting = int((roots.real > -_DRIFT).sum())",
+         "drifting = int((roots.real > _DRIFT).sum())", "zero roots by rounding"),
         ("return delay * crossing.frequency < 1e-9", "return delay * crossing.frequency < 1e-3",
          "a slow crossing taken for a zero root"),
         ("delay=0.0 if unstable else first", "delay=first", "margin of an unstable loop"),
@@ -347,8 +351,6 @@ MUTANTS = [
     *_of(
         "design", "design/_local.py",
         ("worst = min(known, key=_Known.order)", "worst = known[0]", "the rest's margin"),
-        ("drifting = int((rightmost.real > -_DRIFT).sum())",
-         "drifting = int((rightmost.real > _DRIFT).sum())", "zero roots by rounding"),
         ("if loop.bend > _BEND:", "if False:", "margin of a singular posture"),
         ("return int(self.unstable_roots.max())", "return int(self.unstable_roots[0])",
          "unstable instants"),

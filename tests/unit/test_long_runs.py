@@ -7,7 +7,7 @@ import pytest
 
 import sealag
 from helpers.small_systems import arm_system
-from sealag.design import load, local_margins
+from sealag.design import load
 from sealag.errors import InputError
 from sealag.passivity import verify
 from sealag.report import read_recording, write_run
@@ -90,9 +90,9 @@ def test_a_motion_of_several_blocks_is_certified_as_in_one(
 
 def test_a_margin_of_several_blocks_is_that_of_one(swinging, monkeypatch):
     system, motion = swinging
-    parted = local_margins(system, motion)
+    parted = system.local_margins(motion)
     monkeypatch.setattr("sealag.store.BLOCK", 1000)
-    assert parted == local_margins(system, motion)
+    assert parted == system.local_margins(motion)
 
 
 def test_what_fails_in_a_later_block_is_counted_over_all(swinging):

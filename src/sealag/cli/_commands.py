@@ -93,11 +93,11 @@ def certify_project(
     if criterion is not None and criterion not in set(Criterion):
         raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
     count = None if proofs == "all" else _count(proofs)
-    path = out or Path(f"{design.resolve_project(project).stem}.certificate.json")
     system = design.load(project)
+    path = out or Path(f"{system.name}.certificate.json")
     check_output(path, *system.files, *([motion] if motion else []))
     along = _motion(system, motion)
-    design.check_question(system, along, criterion, time_varying=time_varying, proofs=count)
+    system.criterion_asked(along, criterion, time_varying=time_varying, proofs=count)
     with Draft(path) as draft:
         compile_kernels()
         with _busy("certifying"):
@@ -173,7 +173,7 @@ def margin_project(
     along = _motion(system, motion)
     compile_kernels()
     with _busy("computing margins"):
-        found = design.local_margins(system, along, horizon=horizon)
+        found = system.local_margins(along, horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)

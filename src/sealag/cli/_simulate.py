@@ -37,10 +37,10 @@ def simulate_project(
     as_json: bool,
 ) -> None:
     """Run a scenario with a progress bar, write the recording and show the audit."""
-    path = out or Path(f"{design.resolve_project(project).stem}.mcap")
     system = design.load(project)
+    path = out or Path(f"{system.name}.mcap")
     check_output(path, *system.files)
-    length = design.scenario_duration(system, scenario) if duration is None else duration
+    length = system.duration(scenario) if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"--duration is {length}; a positive time in s is needed.")
     try:

@@ -24,8 +24,6 @@ from sealag.store import release
 from sealag.typing import Array
 from sealag.whole_body import (
     Measurement,
-    StoringController,
-    TankController,
     TickController,
 )
 
@@ -135,9 +133,9 @@ class _Loop:
         n, feet = robot.n, len(scene.feet)
         allocate = {"nq": robot.nq, "nv": robot.nv, "n": n, "contacts": feet}
         self.truth, self.received = (Measurement.allocate(**allocate) for _ in range(2))
-        self._storing = controller if isinstance(controller, StoringController) else None
-        self._tank = controller if isinstance(controller, TankController) else None
-        self._given, self._said = UndelayedWork(n), math.inf if self._storing is None else -1.0
+        self._storage = getattr(controller, "storage", None)
+        self._tank: Any = controller if hasattr(controller, "tank_energy") else None
+        self._given, self._said = UndelayedWork(n), math.inf if self._storage is None else -1.0
         self._frames = frames
 
     # Start -------------------------------------------------------------------------------------
@@ -332,11 +330,9 @@ class _Loop:
     def _state(self) -> None:
         """Let the controller state its undelayed command and its potential."""
         time, channels = self.plant.time, self._channels
-        if self._storing is not None and time != self._said:
+        if self._storage is not None and time != self._said:
             self.plant.sense(time, self.truth.data)
-            channels.storage[0] = self._ask(
-                self._storing.storage, time, self.truth, self._given.command
-            )
+            channels.storage[0] = self._ask(self._storage, time, self.truth, self._given.command)
             self._given.move(self.plant.now.theta)
             self._said = time
         if self._tank is not None:
@@ -391,7 +387,7 @@ class _Loop:
                 shaped_inertia=actuators.shaped_inertia,
                 ratio=actuators.rotor_inertia / actuators.shaped_inertia,
                 stated=None
-                if self._storing is None
+                if self._storage is None
                 else Stated(
                     storage=log.storage,
                     tank=log.tank if log.tank.any() else None,
