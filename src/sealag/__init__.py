@@ -27,7 +27,7 @@ _HOME = {
     "Motion": "sealag.robot",
     "load_robot": "sealag.robot",
     "Actuators": "sealag.actuation",
-    "write_certificate": "sealag.passivity",
+    "Certificate": "sealag.passivity",
     "Link": "sealag.delay",
     "RoundTrip": "sealag.delay",
     "Constant": "sealag.delay",
@@ -38,6 +38,7 @@ _HOME = {
 
 __all__ = [
     "Actuators",
+    "Certificate",
     "Constant",
     "Contact",
     "Controller",
@@ -62,7 +63,6 @@ __all__ = [
     "load_robot",
     "simulate",
     "verify_design",
-    "write_certificate",
 ]
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from sealag.delay import Constant, Delays, Link, RoundTrip, Sinusoid
     from sealag.design import System, certify, load, load_motion, simulate, verify_design
     from sealag.errors import SealagError
-    from sealag.passivity import write_certificate
+    from sealag.passivity import Certificate
     from sealag.robot import Contact, Motion, load_robot
     from sealag.whole_body import (
         Controller,

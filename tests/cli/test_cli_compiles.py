@@ -9,7 +9,6 @@ import pytest
 from helpers.certificates import half_a_step
 from helpers.designs import EXAMPLES
 from sealag.design import load
-from sealag.passivity import write_certificate
 
 HELD = EXAMPLES / "hume_held.toml"
 
@@ -79,7 +78,7 @@ def test_refusals_compile_nothing(fresh, tmp_path, cli):
         assert "compiling" not in err
     assert cli("--help")[0] == 0
     assert fresh == []
-    write_certificate(sealag.certify(load(HELD)), out)
+    sealag.certify(load(HELD)).write(out)
     assert cli("verify", out)[0] == 0
     assert fresh == [], "a file's own numbers need no kernels"
     assert cli("certify", HELD, "--out", out)[0] == 0

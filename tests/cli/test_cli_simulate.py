@@ -11,7 +11,7 @@ import pytest
 from helpers.designs import EXAMPLES
 from sealag.delay import RoundTrip, Sinusoid
 from sealag.design import load, simulate
-from sealag.report import read_recording, run_summary
+from sealag.report import read_recording
 from sealag.walking import WalkingGait, WalkingOptions
 
 
@@ -219,12 +219,12 @@ def test_the_largest_is_printed_and_not_the_mean_or_the_signed_maximum():
         scenario="balance",
         duration=0.3,
     )
-    answer = run_summary(result, recording=Path("run.mcap"))
+    answer = result.summary(recording=Path("run.mcap"))
     assert answer["measurement_age_s"] == result.ages.measurement
     assert answer["measurement_age_s"] > 1.5 * result.measurement_age.mean()
     assert answer["command_age_s"] >= result.command_age.max()
     assert answer["total_age_s"] > answer["command_age_s"]
     law = -np.abs(result.audit.law_injection)
     turned = replace(result, audit=replace(result.audit, law_injection=law))
-    assert run_summary(turned, recording=Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
+    assert turned.summary(recording=Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
     assert answer["injection_error_j"] == result.audit.injection_error > 0.0

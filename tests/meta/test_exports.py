@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from helpers.source import ROOT, exported, imported, modules, tree
 
-MOST = 131
-"""Names of all rooms together; the aim is 90."""
+MOST = 89
+"""Names of all rooms together: fewer than 90."""
 NO_ROOMS = {"sealag.cli", "sealag.data", "sealag.kernels"}
 """The command line is called by its entry point; data and kernels export nothing."""
 

@@ -12,7 +12,6 @@ import pytest
 from helpers.designs import EXAMPLES
 from sealag.design import load, simulate
 from sealag.errors import SealagError
-from sealag.report import run_summary
 from sealag.simulation import Outcome
 from sealag.whole_body import GravityCompensation, Signal
 
@@ -101,7 +100,7 @@ def test_no_design_ends_in_a_traceback(name):
             ends["refused"] += 1
             continue
         assert bool(run.message) == (run.outcome is not Outcome.COMPLETED)
-        json.dumps(run_summary(run, recording=Path("run.mcap")), allow_nan=False)
+        json.dumps(run.summary(recording=Path("run.mcap")), allow_nan=False)
         ends["completed" if run.outcome is Outcome.COMPLETED else "ended"] += 1
     assert min(ends[end] for end in ("refused", "completed")) > 0
     assert (ends["ended"] > 0) == system.robot.floating_base

@@ -186,6 +186,29 @@ class Actuators:
             bearing=own(joint_damping),
         )
 
+    def fastest_link(self, robot: Robot, q: Array) -> tuple[float, str]:
+        """Return how fast the fastest link follows its spring and dampers, and its joint.
+
+        The largest |λ| of M v̇ = -K δ - (D_s + joint damping) v with locked motors and feet in the
+        air, 1/s: what decides how long a step may be.
+
+        Args:
+            robot: the robot.
+            q: (nq,) configuration.
+        """
+        n = robot.n
+        mobility = np.linalg.inv(robot.mass_matrix(q))[-n:, -n:]
+        damping = self.spring_damping + robot.damping
+        root = np.sqrt(self.spring_stiffness)
+        O = np.zeros((n, n))
+        # State (√K δ, v): without damping the matrix is as well scaled as its eigenvalues.
+        A = np.block([[O, np.diag(root)], [-mobility * root, -mobility * damping]])
+        values, modes = np.linalg.eig(A)
+        fastest = int(np.abs(values).argmax())
+        rate, mode = float(np.abs(values[fastest])), np.abs(modes[:, fastest]) ** 2
+        taken = mode[:n] + damping * mode[n:] / rate  # energy that spring and dampers take
+        return rate, robot.joints[int(taken.argmax())]
+
     def transparency(self, *, delay: float = 0.0) -> Transparency:
         """Return bandwidth, damping ratio and phase lag of the locked joints in closed form.
 

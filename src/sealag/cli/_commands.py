@@ -13,7 +13,7 @@ from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import Draft, check_output, write_text
-from sealag.passivity import Answer, Certificate, Criterion, Status, write_certificate
+from sealag.passivity import Answer, Certificate, Criterion, Status
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
 
@@ -104,7 +104,7 @@ def certify_project(
             certificate = design.certify(
                 system, along, criterion=criterion, time_varying=time_varying, proofs=count
             )
-        write_certificate(certificate, draft)
+        certificate.write(draft)
     if as_json:
         show_json(certificate.summary())
     else:
@@ -201,8 +201,6 @@ def verify_certificate(
     as_json: bool,
 ) -> int:
     """Check a certificate, against its project if one is given; 1 if it does not hold."""
-    from sealag.passivity import read_certificate, verify
-
     if second:
         if exact or project is not None or motion is not None:
             raise InputError(
@@ -212,9 +210,9 @@ def verify_certificate(
     if project is None:
         if motion is not None:
             raise InputError("--motion needs --project.")
-        result = verify(path, exact=exact)
+        result = Certificate.verify(path, exact=exact)
     else:
-        read_certificate(path)
+        Certificate.read(path)
         system = design.load(project)
         along = _motion(system, motion)
         compile_kernels()

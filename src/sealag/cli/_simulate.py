@@ -14,7 +14,7 @@ from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import InputError
 from sealag.files import Draft, check_output
-from sealag.report import run_summary, write_run
+from sealag.report import write_run
 from sealag.simulation import MeasuredGait, Outcome, Run
 from sealag.units import seconds_from_ms
 from sealag.version import __version__
@@ -68,7 +68,7 @@ def simulate_project(
             ),
         )
         saved = _record(run, system, draft)
-    answer = run_summary(run, recording=saved)
+    answer = run.summary(recording=saved)
     kind = system.simulation.scenario if scenario is None else scenario
     if kind == "walk":
         answer |= gait_summary(system, run)

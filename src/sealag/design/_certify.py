@@ -13,7 +13,6 @@ from sealag.design._criteria import (
     common_bound,
     delayed_stiffness,
     prove_instants,
-    stated_windows,
     time_varying_bound,
 )
 from sealag.design._local import Local
@@ -256,7 +255,7 @@ def _evidence(case: _Case) -> Evidence:
     W_moving = _stated_multiplier(moving)
     windows = ()
     if moving is not None and W_moving is not None:
-        windows = stated_windows(moving, case.system.actuators.motor_damping)
+        windows = moving.stated_windows(case.system.actuators.motor_damping)
     return Evidence(
         time_s=case.motion.time,
         bounds_s=tuple(case.bound.delay.tolist()),

@@ -9,7 +9,7 @@ import numpy as np
 
 from sealag import passivity
 from sealag.errors import SolverError
-from sealag.passivity import Bound, Criterion, InstantProof, Joined, Problem, Solver, Window, solve
+from sealag.passivity import Bound, Criterion, InstantProof, Problem, Solver, solve
 from sealag.robot import Motion
 from sealag.store import Store, release
 from sealag.typing import Array, BoolArray
@@ -88,7 +88,7 @@ def bounds_along(
         solver: where multipliers of several levels come from; Clarabel's own interface if None.
     """
     system, count, printed = along.system, len(along.motion), kind is Criterion.PUBLISHED
-    conditions, whole = Conditions.room(system, count), Joined(count)
+    conditions, whole = Conditions.room(system, count), Bound.by_parts(count)
     published = published or printed
     least, asymmetry = np.inf if published else np.nan, 0.0
     for rows, spaces in along.parts():
@@ -346,30 +346,6 @@ def time_varying_bound(bound: Bound, motion: Motion, *, solver: Solver | None = 
     breaks = np.flatnonzero(np.diff(motion.contact_index)) + 1
     share = passivity.Windows(width=POLYTOPE_WIDTH, breaks=breaks.tolist())
     return solve(bound.problem, share=share, solver=solver).eased(PROOF_SHARE)
-
-
-def stated_windows(bound: Bound, D_theta: Array) -> tuple[Window, ...]:
-    """Return the polytopes of a time-varying bound in Nm/rad.
-
-    Args:
-        bound: from `time_varying_bound`.
-        D_theta: (n,) motor damping, Nms/rad.
-    """
-    root = np.sqrt(D_theta)[:, None]
-    found = []
-    for one in bound.windows:
-        centre, *axes = root * one.M
-        kept = [axis for axis in axes if axis.any()]
-        found.append(
-            Window(
-                first=one.first,
-                last=one.last,
-                centre=centre,
-                axes=np.array(kept).reshape(-1, *centre.shape),
-                radius=one.radius,
-            )
-        )
-    return tuple(found)
 
 
 def prove_instants(

@@ -13,7 +13,6 @@ from sealag.actuation import Actuators
 from sealag.delay import (
     Constant,
     Delays,
-    DelaySignal,
     Link,
     PacketOrder,
     RoundTrip,
@@ -296,7 +295,7 @@ def _packets(keys: Any) -> dict[str, Any]:
     }
 
 
-def _signal(section: Any, folder: Path) -> DelaySignal:
+def _signal(section: Any, folder: Path) -> Constant | Sinusoid | Table:
     match section.kind:
         case "constant":
             return Constant(section.value_ms * 1e-3)
@@ -313,7 +312,7 @@ def _signal(section: Any, folder: Path) -> DelaySignal:
             return _samples(section, folder)
 
 
-def _samples(section: Any, folder: Path) -> DelaySignal:
+def _samples(section: Any, folder: Path) -> Table:
     """Measured delays: one number (ms) a line."""
     path = folder / section.file
     content = read_whole(path, what="The delay samples", largest=LARGEST_SAMPLES_BYTES)

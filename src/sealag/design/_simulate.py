@@ -11,16 +11,7 @@ from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.robot import ContactKind
-from sealag.simulation import (
-    Clock,
-    Foot,
-    Network,
-    Push,
-    Run,
-    Scene,
-    closed_loop,
-    fastest_link,
-)
+from sealag.simulation import Clock, Foot, Network, Push, Run, Scene, closed_loop
 from sealag.typing import Array
 from sealag.units import seconds_from_ms
 from sealag.walking import GroundProfile, Walking
@@ -252,7 +243,7 @@ def _clock(system: System) -> Clock:
             f"multiple of the embedded one of {embedded * 1e3:g} ms (delays.embedded_period_ms), "
             "as a run needs it; change one of them."
         )
-    rate, _ = fastest_link(system.robot, system.actuators, system.posture)
+    rate, _ = system.actuators.fastest_link(system.robot, system.posture)
     longest = max(SHORTEST_STEP, 2.0 * math.pi / (STEPS_PER_SWING * rate))
     whole = embedded or central
     coarsest = math.ceil(whole / min(LONGEST_STEP, longest) - 1e-9)

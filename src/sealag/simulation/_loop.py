@@ -11,7 +11,6 @@ from sealag.errors import InputError, SealagError, SolverError
 from sealag.kernels import keep
 from sealag.robot import Robot
 from sealag.simulation._audit import Books, Stated, UndelayedWork, audit
-from sealag.simulation._exchange import Exchanges
 from sealag.simulation._interrupt import Interrupt
 from sealag.simulation._memory import events_of, open_channels, open_log
 from sealag.simulation._network import Clock, Network
@@ -190,7 +189,7 @@ class _Loop:
         kernel, step = self._kernel, self.clock.physics
         self.plant.held.command[:], self.plant.held.known_torque[:] = self.first, 0.0
         self._log, self._store = open_log(self.plant, -(-steps // every) + 1)  # too long ends here
-        ways = Exchanges.plan(self._network, self.clock, duration=steps * step, seed=self.seed)
+        ways = self._network.plan(self.clock, duration=steps * step, seed=self.seed)
         self.exchanges = ways
         self._periods = kernel.Periods(
             step=step,
