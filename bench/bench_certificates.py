@@ -11,7 +11,7 @@ import numpy as np
 
 import sealag
 from sealag.passivity import ClarabelDirect, Motion, Problem, max_delay, solve
-from sealag.walking import GroundProfile, plan_walk, walk_motion
+from sealag.walking import GroundProfile, WalkPlan
 
 SIZES = ((3, 3), (6, 6), (12, 12))
 BIG = 1_000
@@ -105,7 +105,7 @@ def motions() -> None:
             f"{peer / BIG * count / own:6,.0f} x as long an instant"
         )
     system = sealag.load("bundled:hume")
-    motion = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=7), rate=1600.0)
+    motion = WalkPlan.over(GroundProfile.paper(), steps=7).motion(system.robot, rate=1600.0)
     spaces = system.spaces(motion)
     start = time.perf_counter()
     certificate = sealag.certify(system, motion)

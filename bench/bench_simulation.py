@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 import sealag
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.robot import load_robot
 from sealag.simulation import Run
 
@@ -56,7 +56,7 @@ def theirs(step: float, duration: float = 1.0) -> float:
     from helpers.mujoco_sea import MujocoRobot
 
     robot = load_robot("bundled:hume.urdf", floating_base=True)
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints,
         spring_stiffness=1000.0,
         rotor_inertia=np.array([0.1357, 0.093, 0.093] * 2),

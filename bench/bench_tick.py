@@ -13,8 +13,7 @@ import numpy as np
 
 from bench.peers.timing import median_us
 from sealag.design import load
-from sealag.robot import resolve_urdf
-from sealag.whole_body import SIGNAL_NAMES, Controller, Measurement, signal_named
+from sealag.whole_body import Controller, Measurement, Signal
 
 ANYMAL = "anymal_b_simple_description/robots/anymal.urdf"
 PEERS = Path(__file__).with_name("peers")
@@ -52,7 +51,7 @@ def _ours(signal: str) -> Callable[[], object]:
     robot = system.robot
     controller = Controller(
         robot,
-        replace(system.law, signal=signal_named(signal)),
+        replace(system.law, signal=Signal.named(signal)),
         system.actuators,
         contacts=system.contacts,
         posture=system.posture,
@@ -75,10 +74,9 @@ def _pink() -> Callable[[], object]:
     import pinocchio as pin
     from pink.tasks import ComTask, FrameTask, PostureTask
 
-    model = pin.buildModelFromUrdf(
-        str(resolve_urdf(f"example-robot-data:{ANYMAL}")), pin.JointModelFreeFlyer()
-    )
-    q = load("examples/anymal.toml").posture
+    system = load("examples/anymal.toml")
+    q = system.posture
+    model = pin.buildModelFromUrdf(str(system.robot.urdf_path), pin.JointModelFreeFlyer())
     configuration = pink.Configuration(model, model.createData(), q)
     tasks = [FrameTask(f"{leg}_FOOT", 1.0, 0.0) for leg in ("LF", "RF", "LH", "RH")]
     tasks += [ComTask(1.0), FrameTask("base", 0.0, 1.0), PostureTask(1e-3)]
@@ -106,7 +104,7 @@ def _environment(peer: Peer) -> Path:
 
 def _without_meshes(folder: Path) -> Path:
     """Write the robot without visuals and collision shapes, which PlaCo would look for."""
-    tree = ElementTree.parse(resolve_urdf(f"example-robot-data:{ANYMAL}"))
+    tree = ElementTree.parse(load("examples/anymal.toml").robot.urdf_path)
     for link in tree.getroot().iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)
@@ -126,7 +124,7 @@ def _other_us(peer: Peer, urdf: Path) -> float:
 def run() -> None:
     """Print microseconds a tick on ANYmal with four feet, and the ratios."""
     print("\nOne control tick, ANYmal, four point feet, CoM and base orientation")
-    own = {name: median_us(_ours(name)) for name in SIGNAL_NAMES}
+    own = {name: median_us(_ours(name)) for name in Signal.names()}
     for name, value in own.items():
         print(f"  sealag, {name:18} {value:7.1f} µs (torques)")
     with tempfile.TemporaryDirectory() as folder:

@@ -27,9 +27,8 @@ _HOME = {
     "Contact": "sealag.robot",
     "Motion": "sealag.robot",
     "load_robot": "sealag.robot",
-    "actuators": "sealag.actuation",
-    "actuators_of": "sealag.actuation",
-    "write_certificate": "sealag.passivity",
+    "Actuators": "sealag.actuation",
+    "Certificate": "sealag.passivity",
     "Link": "sealag.delay",
     "RoundTrip": "sealag.delay",
     "Constant": "sealag.delay",
@@ -39,6 +38,8 @@ _HOME = {
 }
 
 __all__ = [
+    "Actuators",
+    "Certificate",
     "Constant",
     "Contact",
     "Controller",
@@ -57,8 +58,6 @@ __all__ = [
     "Tank",
     "Task",
     "__version__",
-    "actuators",
-    "actuators_of",
     "certify",
     "freeze",
     "load",
@@ -66,15 +65,14 @@ __all__ = [
     "load_robot",
     "simulate",
     "verify_design",
-    "write_certificate",
 ]
 
 if TYPE_CHECKING:
-    from sealag.actuation import actuators, actuators_of
+    from sealag.actuation import Actuators
     from sealag.delay import Constant, Delays, Link, RoundTrip, Sinusoid
     from sealag.design import System, certify, load, load_motion, simulate, verify_design
     from sealag.errors import SealagError
-    from sealag.passivity import write_certificate
+    from sealag.passivity import Certificate
     from sealag.robot import Contact, Motion, load_robot
     from sealag.whole_body import (
         Controller,

@@ -11,15 +11,15 @@ from humanoids2016._walk import WalkCase, at_delay_scale, walking_of
 from humanoids2016._walk_table import walk_success
 from sealag.design import load
 from sealag.typing import IntArray
-from sealag.walking import Ground, Prediction, Walking
+from sealag.walking import Ground, Walking
 
 PUBLISHED_LAW = "published law"
 
 LEFT_OUT: Mapping[str, Mapping[str, Any]] = {
     "everything": {},
     "no preview": {"preview": False},
-    "prediction: constant velocity": {"prediction": Prediction.VELOCITY},
-    "no prediction": {"prediction": Prediction.NONE},
+    "prediction: constant velocity": {"prediction": "velocity"},
+    "no prediction": {"prediction": "none"},
     "no velocity feedforward": {"velocity_feedforward": False},
     "no lead": {"lead": False},
     "no acceleration feedforward": {"acceleration_feedforward": False},
@@ -33,7 +33,7 @@ LEFT_OUT: Mapping[str, Mapping[str, Any]] = {
 }
 
 _TRIAL: Mapping[str, Any] = {
-    "prediction": Prediction.VELOCITY,
+    "prediction": "velocity",
     "momentum_placement": False,
     "task_damping": 0.0,
     "torque_feedback": 0.0,

@@ -7,7 +7,8 @@ import numpy as np
 
 from humanoids2016._walk import WalkCase, at_delay_scale, walking_of
 from humanoids2016._walk_table import rough_grounds, walk_success
-from sealag.design import System, certified_bounds, load, margin_of
+from sealag.design import System, load
+from sealag.margin import DelayMargin
 from sealag.robot import Motion
 from sealag.simulation import Push
 from sealag.typing import Array
@@ -151,7 +152,7 @@ def _bounds(system: System, motion: Motion, stiffness: float) -> tuple[float, fl
     for signal in (MotorAngles(), StaticJoint()):
         variant = replace(design, law=replace(design.law, signal=signal))
         spaces = variant.spaces(motion)
-        certified.append(float(certified_bounds(spaces, variant).delay.min()))
+        certified.append(float(variant.certified_bounds(spaces).delay.min()))
     sample = np.linspace(0, len(motion) - 1, LOOPS).astype(int)
-    crossings = [margin_of(design.frozen(motion, int(k))).first_crossing for k in sample]
+    crossings = [DelayMargin.of_loop(design.frozen(motion, int(k))).first_crossing for k in sample]
     return (*certified, float(min(crossings)))

@@ -6,7 +6,7 @@ import numpy as np
 
 from humanoids2016._claims import Claim, Verdict
 from humanoids2016._random_table import RandomPlantTable
-from sealag.design import System, certified_bounds
+from sealag.design import System
 from sealag.passivity import max_delay
 from sealag.robot import Contact, Motion, Robot
 from sealag.simulation import Run
@@ -177,7 +177,7 @@ def _certified(
     law = replace(system.law, stiffness_form=form, signal=signal, gravity=gravity)
     design = replace(system, law=law)
     spaces = design.spaces(motion)
-    bounds = certified_bounds(spaces, design)
+    bounds = design.certified_bounds(spaces)
     return CertifiedVariant(
         signal=signal.name,
         form=form,

@@ -4,18 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.actuation import Actuators, actuators
+from sealag.actuation import Actuators
 from sealag.errors import InputError
 from sealag.typing import Array
-from sealag.whole_body import (
-    SIGNAL_NAMES,
-    FrozenLoop,
-    GravityCompensation,
-    Signal,
-    StiffnessForm,
-    sea_loop,
-    signal_named,
-)
+from sealag.whole_body import FrozenLoop, GravityCompensation, Signal, StiffnessForm
 
 _SYMMETRIC = 1e-9
 
@@ -112,7 +104,7 @@ def random_sea_plant(
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 7))
     drawn_form = StiffnessForm(rng.choice(list(StiffnessForm)))
-    drawn_signal = SIGNAL_NAMES[rng.integers(len(SIGNAL_NAMES))]
+    drawn_signal = Signal.names()[rng.integers(len(Signal.names()))]
     if joints is not None:
         n = joints
     if n < 1:
@@ -123,7 +115,7 @@ def random_sea_plant(
         raise InputError(f"{problem}.") from None
     chosen = drawn_signal if signal is None else signal
     return _plant(
-        rng, n, kind=kind, signal=signal_named(chosen) if isinstance(chosen, str) else chosen
+        rng, n, kind=kind, signal=Signal.named(chosen) if isinstance(chosen, str) else chosen
     )
 
 
@@ -146,7 +138,7 @@ def _plant(rng: np.random.Generator, n: int, *, kind: StiffnessForm, signal: Sig
     F = signal.motor_stiffness(F_q, K)
     if kind is not StiffnessForm.PUBLISHED:
         F = (F + F.T) / 2.0
-    drives = actuators(
+    drives = Actuators.of(
         [f"joint{i}" for i in range(n)], spring_stiffness=K, rotor_inertia=B_s, motor_damping=D
     )
     loop = _frozen_loop(M, G, drives, F=F, links=not signal.has_potential)
@@ -173,4 +165,4 @@ def _task_stiffness(kind: StiffnessForm, Lambda: Array, K_x: Array) -> Array:
 def _frozen_loop(M: Array, G: Array, drives: Actuators, *, F: Array, links: bool) -> FrozenLoop:
     none = np.zeros_like(F)
     C_z, C_theta = (-F, none) if links else (none, -F)
-    return sea_loop(drives, M=M, H=G, S=np.eye(len(F)), C_z=C_z, C_theta=C_theta)
+    return FrozenLoop.of_links(drives, M=M, H=G, S=np.eye(len(F)), C_z=C_z, C_theta=C_theta)

@@ -23,12 +23,12 @@ from humanoids2016._walk_table import (
     walk_success,
 )
 from sealag import __version__ as VERSION
-from sealag.design import System, certify, load, save_motion
+from sealag.design import System, certify, load
 from sealag.errors import InputError
 from sealag.files import make_folder
 from sealag.report import write_run
 from sealag.robot import Motion
-from sealag.walking import plan_walk, walk_motion
+from sealag.walking import WalkPlan
 
 
 def reproduce(
@@ -58,7 +58,7 @@ def reproduce(
     found = study(project, QUICK if quick else StudySize(), progress=progress)
     system, walk = found.system, found.walk
     progress("[7/7] writing the page")
-    save_motion(found.motion, system.robot, out / "walk.csv")
+    system.save_motion(found.motion, out / "walk.csv")
     write_run(walk.run, system.robot, out / "walk.mcap", project=system.text, version=VERSION)
     page = write_paper_page(out, found, version=VERSION)
     return {
@@ -79,7 +79,7 @@ def reproduce(
 def planned_walk(system: System, *, rate: float = 1000.0) -> Motion:
     """Return the planned walk: feet, ground, steps and CoM height of the project's [walking].
 
-    Apex speeds and step lengths are those of `plan_walk`, as the paper's plan has them.
+    Apex speeds and step lengths are those of `WalkPlan.over`, as the paper's plan has them.
 
     Args:
         system: the project.
@@ -90,8 +90,8 @@ def planned_walk(system: System, *, rate: float = 1000.0) -> Motion:
         RobotError: a foothold is out of reach.
     """
     walking = walking_of(system)
-    plan = plan_walk(walking.ground, steps=walking.steps, com_height=walking.gait.com_height)
-    return walk_motion(system.robot, plan, rate=rate, feet=walking.feet)
+    plan = WalkPlan.over(walking.ground, steps=walking.steps, com_height=walking.gait.com_height)
+    return plan.motion(system.robot, rate=rate, feet=walking.feet)
 
 
 def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> Findings:

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.margin import DelayMargin, delay_margin
 from sealag.passivity import Instant, Problem, max_delay, solve
 from sealag.typing import Array
-from sealag.whole_body import sea_loop
+from sealag.whole_body import FrozenLoop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,10 +56,10 @@ def delayed_margin(
         link_feedback: whether the link angle is fed back instead of the motor angle.
     """
     names = [f"joint{i}" for i in range(len(K))]
-    drives = actuators(names, spring_stiffness=K, rotor_inertia=B_s, motor_damping=D)
+    drives = Actuators.of(names, spring_stiffness=K, rotor_inertia=B_s, motor_damping=D)
     none = np.zeros_like(F)
     C_z, C_theta = (-F, none) if link_feedback else (none, -F)
-    loop = sea_loop(drives, M=M, H=none, S=np.eye(len(K)), C_z=C_z, C_theta=C_theta)
+    loop = FrozenLoop.of_links(drives, M=M, H=none, S=np.eye(len(K)), C_z=C_z, C_theta=C_theta)
     return delay_margin(loop.A_0, loop.A_1)
 
 

@@ -21,7 +21,7 @@ from sealag.simulation import (
     closed_loop,
 )
 from sealag.typing import Array
-from sealag.walking import Walking, WalkStart, begin_walk
+from sealag.walking import Walking
 from sealag.whole_body import Measurement, TickController
 
 TICK = 1e-3  # s, period of the central controller
@@ -140,7 +140,7 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
     """
     case = case or WalkCase(walking=walking_of(system))
     robot, believed = system.robot, case.believed(system.actuators)
-    start = begin_walk(robot, believed, case.walking, period=TICK)
+    start = case.walking.begin(robot, believed, period=TICK)
     plant, springs = robot, believed
     if case.model_error > 0.0:
         plant = wrong_robot(robot, error=case.model_error, seed=case.seed)
@@ -152,7 +152,7 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
     run = closed_loop(
         plant,
         springs,
-        _Witness(seen, start, asked),
+        _Witness(seen, start.controller.tau_task, asked),
         q=start.q,
         v=start.v,
         theta=start.theta,
@@ -174,8 +174,8 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
 class _Witness:
     """Keeps the task torque of every tick."""
 
-    def __init__(self, seen: TickController, start: WalkStart, asked: list[Array]) -> None:
-        self._seen, self._controller, self._asked = seen, start.controller, asked
+    def __init__(self, seen: TickController, task: Array, asked: list[Array]) -> None:
+        self._seen, self._task, self._asked = seen, task, asked
 
     def reset(self, t: float, measurement: Measurement) -> None:
         self._asked.clear()
@@ -183,4 +183,4 @@ class _Witness:
 
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
         self._seen.tick(t, measurement, out)
-        self._asked.append(self._controller.tau_task.copy())
+        self._asked.append(self._task.copy())

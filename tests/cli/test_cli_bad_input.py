@@ -7,12 +7,12 @@ import time
 import numpy as np
 import pytest
 
+from helpers.robots import urdf_path
 from helpers.source import ROOT
 from sealag.cli import main
-from sealag.design import load, save_motion
-from sealag.robot import resolve_urdf
+from sealag.design import load
 
-GOOD = resolve_urdf("bundled:hume.urdf").with_suffix(".toml").read_text()
+GOOD = urdf_path("bundled:hume.urdf").with_suffix(".toml").read_text()
 
 
 def fails(capsys, *arguments):
@@ -255,10 +255,10 @@ def test_good_arm_is_not_refused_and_mimics_have_no_actuator(tmp_path):
 
 @pytest.fixture(scope="module")
 def walk():
-    from sealag.walking import GroundProfile, plan_walk, walk_motion
+    from sealag.walking import GroundProfile, WalkPlan
 
     system = load("bundled:hume")
-    return system, walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=1), rate=50.0)
+    return system, WalkPlan.over(GroundProfile.paper(), steps=1).motion(system.robot, rate=50.0)
 
 
 def spoil_nan(table):
@@ -295,7 +295,7 @@ def test_motion_problem_is_named(name, walk, tmp_path, capsys):
     system, motion = walk
     spoil, word = MOTIONS[name]
     path = tmp_path / "m.npz"
-    save_motion(motion, system.robot, path)
+    system.save_motion(motion, path)
     with np.load(path) as table:
         spoiled = spoil(dict(table))
     np.savez(path, **spoiled)
@@ -329,7 +329,7 @@ def test_csv_problem_is_named(name, walk, tmp_path, capsys):
 
     system, motion = walk
     path = tmp_path / "m.csv"
-    save_motion(motion, system.robot, path)
+    system.save_motion(motion, path)
     good = path.read_text()
     path.write_text("\ufeff" + good.replace("\n", "\r\n"))
     assert len(load_motion(path, system.robot, contacts=system.contacts)) == len(motion)
@@ -463,7 +463,7 @@ def test_saved_motion_comes_back(walk, tmp_path):
     system, motion = walk
     for ending in (".csv", ".npz", ".parquet"):
         path = tmp_path / f"m{ending}"
-        save_motion(motion, system.robot, path)
+        system.save_motion(motion, path)
         back = load_motion(path, system.robot, contacts=system.contacts)
         np.testing.assert_allclose(back.q, motion.q, atol=1e-15)
         np.testing.assert_allclose(back.v, motion.v, atol=1e-15)

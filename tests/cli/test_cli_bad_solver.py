@@ -11,7 +11,6 @@ from helpers.certificates import failures, half_a_step, plain
 from helpers.designs import EXAMPLES
 from helpers.solvers import LIES, Forgetful, Lying
 from sealag.cli import main
-from sealag.design import save_motion
 from sealag.passivity import ClarabelCvxpy, ClarabelDirect, Criterion
 
 BAD = {
@@ -129,7 +128,7 @@ def test_a_bound_without_a_proof_is_withdrawn(answers):
 def test_the_command_line_says_it_too(walk, tmp_path, monkeypatch, capsys):
     system, motion = walk
     path = tmp_path / "walk.npz"
-    save_motion(motion, system.robot, path)
+    system.save_motion(motion, path)
     monkeypatch.setattr("sealag.design.load", lambda project: system)
 
     def answer(*options):

@@ -42,15 +42,15 @@ def test_answers_with_the_contract(design, criterion, tmp_path, cli):
 
 
 def test_motion_of_many_instants(tmp_path, cli):
-    from sealag.design import load, save_motion
-    from sealag.walking import GroundProfile, plan_walk, walk_motion
+    from sealag.design import load
+    from sealag.walking import GroundProfile, WalkPlan
 
     system = load("bundled:hume")
-    motion = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=1), rate=200.0)
+    motion = WalkPlan.over(GroundProfile.paper(), steps=1).motion(system.robot, rate=200.0)
     answers = []
     for ending in (".csv", ".npz", ".parquet"):
         path = tmp_path / f"walk{ending}"
-        save_motion(motion, system.robot, path)
+        system.save_motion(motion, path)
         code, text, _ = cli(
             "certify", "bundled:hume", "--motion", path, "--json", "--out",
             tmp_path / "c.json",
@@ -71,13 +71,13 @@ def test_motion_of_many_instants(tmp_path, cli):
 @pytest.mark.slow
 def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, cli):
     """Seven steps at 1 kHz, default proofs, common and time-varying multipliers."""
-    from sealag.design import load, save_motion
-    from sealag.walking import GroundProfile, plan_walk, walk_motion
+    from sealag.design import load
+    from sealag.walking import GroundProfile, WalkPlan
 
     system = load("bundled:hume")
-    motion = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=7), rate=1000.0)
+    motion = WalkPlan.over(GroundProfile.paper(), steps=7).motion(system.robot, rate=1000.0)
     walk, out = tmp_path / "walk.npz", tmp_path / "c.json"
-    save_motion(motion, system.robot, walk)
+    system.save_motion(motion, walk)
     code, text, _ = cli(
         "certify",
         "bundled:hume",
@@ -104,13 +104,13 @@ def test_a_walk_is_verified_exactly_within_a_minute(tmp_path, cli):
 
 
 def test_proofs_are_as_many_as_asked_for(tmp_path, cli):
-    from sealag.design import load, save_motion
-    from sealag.walking import GroundProfile, plan_walk, walk_motion
+    from sealag.design import load
+    from sealag.walking import GroundProfile, WalkPlan
 
     system = load("bundled:hume")
     walk, out = tmp_path / "walk.npz", tmp_path / "c.json"
-    motion = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=1), rate=50.0)
-    save_motion(motion, system.robot, walk)
+    motion = WalkPlan.over(GroundProfile.paper(), steps=1).motion(system.robot, rate=50.0)
+    system.save_motion(motion, walk)
     counts = {}
     for proofs in ("3", "all"):
         code, _, _ = cli(
@@ -166,10 +166,10 @@ def test_margin_command(cli):
 @pytest.mark.parametrize("base", ["--fixed", "--floating"])
 def test_starter_file_answers_once_filled(base, tmp_path, cli):
     """Held by its torso Hume is certified; on two point feet no posture of it is at rest."""
-    from sealag.robot import resolve_urdf
+    from helpers.robots import urdf_path
 
     path = tmp_path / "mine.toml"
-    code, _, _ = cli("init", resolve_urdf("bundled:hume.urdf"), "--out", path, base)
+    code, _, _ = cli("init", urdf_path("bundled:hume.urdf"), "--out", path, base)
     assert code == 0
     code, _, err = cli("certify", path)
     assert code == 2
@@ -195,7 +195,7 @@ def test_starter_file_answers_once_filled(base, tmp_path, cli):
     if base == "--floating":
         assert "no equilibrium" in answer["reasons"][0]
     assert cli("verify", tmp_path / "c.json")[0] == 0
-    code, _, err = cli("init", resolve_urdf("bundled:hume.urdf"), "--out", path)
+    code, _, err = cli("init", urdf_path("bundled:hume.urdf"), "--out", path)
     assert code == 2
     assert "exists already" in err
 

@@ -8,8 +8,7 @@ import pytest
 
 from helpers.certificates import half_a_step
 from helpers.designs import EXAMPLES
-from sealag.design import load, save_motion
-from sealag.passivity import write_certificate
+from sealag.design import load
 
 HELD = EXAMPLES / "hume_held.toml"
 
@@ -55,7 +54,7 @@ def test_refusals_compile_nothing(fresh, tmp_path, cli):
     out, bad, walk = tmp_path / "c.json", tmp_path / "bad.toml", tmp_path / "walk.csv"
     bad.write_text(HELD.read_text().replace("[delays]", "[delay]"))
     hume = load("bundled:hume")
-    save_motion(half_a_step(hume), hume.robot, walk)
+    hume.save_motion(half_a_step(hume), walk)
     text = walk.read_text()
     walk.write_text(text[: len(text) // 2].rpartition(",")[0] + ",nothing\n")
     for command in (
@@ -79,7 +78,7 @@ def test_refusals_compile_nothing(fresh, tmp_path, cli):
         assert "compiling" not in err
     assert cli("--help")[0] == 0
     assert fresh == []
-    write_certificate(sealag.certify(load(HELD)), out)
+    sealag.certify(load(HELD)).write(out)
     assert cli("verify", out)[0] == 0
     assert fresh == [], "a file's own numbers need no kernels"
     assert cli("certify", HELD, "--out", out)[0] == 0

@@ -10,8 +10,8 @@ import pytest
 
 from helpers.designs import EXAMPLES
 from sealag.delay import RoundTrip, Sinusoid
-from sealag.design import load, resolve_project, simulate
-from sealag.report import read_recording, run_summary
+from sealag.design import load, simulate
+from sealag.report import read_recording
 from sealag.walking import WalkingGait, WalkingOptions
 
 
@@ -66,7 +66,7 @@ def test_scenario_completes_and_closes_the_first_law(robot, scenario, tmp_path, 
 
 def test_walk_takes_its_steps(tmp_path, cli):
     """`--scenario walk` walks what the project describes, and says how the gait is."""
-    text = (resolve_project("bundled:hume")).read_text()
+    text = load("bundled:hume").text
     path = tmp_path / "short.toml"
     path.write_text(text.replace("steps = 7", "steps = 3").replace('"paper" }', '"flat" }', 1))
     out = tmp_path / "w.mcap"
@@ -87,7 +87,7 @@ def test_the_bundled_walk_is_the_default_one():
     walking = load("bundled:hume").walking
     assert walking.gait == WalkingGait()
     assert walking.options == WalkingOptions()
-    section = tomllib.loads(resolve_project("bundled:hume").read_text())["walking"]
+    section = tomllib.loads(load("bundled:hume").text)["walking"]
     assert set(section["gait"]) == {field.name for field in fields(WalkingGait)}
     assert set(section["options"]) == {field.name for field in fields(WalkingOptions)}
 
@@ -219,12 +219,12 @@ def test_the_largest_is_printed_and_not_the_mean_or_the_signed_maximum():
         scenario="balance",
         duration=0.3,
     )
-    answer = run_summary(result, recording=Path("run.mcap"))
+    answer = result.summary(recording=Path("run.mcap"))
     assert answer["measurement_age_s"] == result.ages.measurement
     assert answer["measurement_age_s"] > 1.5 * result.measurement_age.mean()
     assert answer["command_age_s"] >= result.command_age.max()
     assert answer["total_age_s"] > answer["command_age_s"]
     law = -np.abs(result.audit.law_injection)
     turned = replace(result, audit=replace(result.audit, law_injection=law))
-    assert run_summary(turned, recording=Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
+    assert turned.summary(recording=Path("run.mcap"))["law_injection_j"] == law.min() < 0.0
     assert answer["injection_error_j"] == result.audit.injection_error > 0.0

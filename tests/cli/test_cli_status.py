@@ -25,7 +25,7 @@ COMMANDS = {
     "init": (["init", "robot.urdf"], "sealag.design.starter_project"),
     "certify": (["certify", HELD], "sealag.design.load"),
     "margin": (["margin", HELD], "sealag.design.load"),
-    "verify": (["verify", "c.json"], "sealag.passivity.verify"),
+    "verify": (["verify", "c.json"], "sealag.passivity.Certificate.verify"),
     "simulate": (["simulate", HELD], "sealag.design.load"),
     "cite": (["cite"], "importlib.resources.files"),
     "paper": (["paper"], "humanoids2016.reproduce"),

@@ -9,8 +9,8 @@ import sealag
 from helpers.certificates import half_a_step, made, plain, resealed
 from helpers.designs import EXAMPLES
 from sealag.cli import main
-from sealag.design import save_motion, verify_design
-from sealag.passivity import verify, write_certificate
+from sealag.design import verify_design
+from sealag.passivity import Certificate
 
 BAXTER = EXAMPLES / "baxter.toml"
 
@@ -75,7 +75,7 @@ def test_what_a_forger_may_reseal_is_found_with_the_project(name):
     data = made(design_name)
     change(data)
     data = resealed(data)
-    assert verify(data).valid, "the file alone does not show it"
+    assert Certificate.verify(data).valid, "the file alone does not show it"
     result = verify_design(data, *design(design_name))
     assert check in [one.name for one in result.checks if not one.ok]
 
@@ -87,7 +87,7 @@ def test_a_true_certificate_of_another_design_is_found():
     softer = replace(system, law=replace(system.law, tasks=tasks))
     data = plain(sealag.certify(softer))
     assert data["max_delay_s"] > 1.5 * made("baxter")["max_delay_s"]
-    assert verify(data).valid
+    assert Certificate.verify(data).valid
     failed = {check.name for check in verify_design(data, system).checks if not check.ok}
     assert {"design: bounds_s", "design: J*, S, F at instant 0", "design: local_margin_s"} <= failed
 
@@ -111,7 +111,7 @@ def test_the_command(tmp_path, capsys):
         return stop.value.code, *capsys.readouterr()
 
     out, motion = tmp_path / "c.json", tmp_path / "walk.npz"
-    write_certificate(sealag.certify(sealag.load(BAXTER)), out)
+    sealag.certify(sealag.load(BAXTER)).write(out)
     code, text, _ = run(out, "--project", BAXTER, "--json")
     assert (code, json.loads(text)["valid"]) == (0, True)
     copy = tmp_path / "baxter.toml"
@@ -126,8 +126,8 @@ def test_the_command(tmp_path, capsys):
     assert code == 1
     assert "BAD  design: delay_s" in text
     system, walk = design("moving")
-    save_motion(walk, system.robot, motion)
-    write_certificate(sealag.certify(system, walk), out)
+    system.save_motion(walk, motion)
+    sealag.certify(system, walk).write(out)
     assert run(out, "--project", "bundled:hume", "--motion", motion)[0] == 0
     code, _, err = run(out, "--project", "bundled:hume")
     assert code == 2

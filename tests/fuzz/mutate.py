@@ -4,16 +4,14 @@ import copy
 import re
 import types
 import typing
-from pathlib import Path
 from random import Random
 from typing import Any
 
 from pydantic import BaseModel
 
-from sealag.design import parse_project
+from sealag.design import load
 
-_HUME = Path(__file__).resolve().parents[2] / "src" / "sealag" / "data" / "hume.toml"
-PROJECT = type(parse_project(_HUME.read_bytes(), _HUME))
+PROJECT = type(load("bundled:hume").source.project)
 """The schema's class of a whole project."""
 
 NUMBERS = (

@@ -14,7 +14,6 @@ from random import Random
 import sealag
 from fuzz.mutate import mutated, mutated_urdf
 from helpers.toml import to_toml
-from sealag.design import local_margins
 from sealag.errors import SealagError
 from sealag.report import mujoco_model
 
@@ -96,7 +95,7 @@ def _stages(path: Path):
     yield "load", load
     if system is not None:
         yield "certify", lambda: sealag.certify(system)
-        yield "margin", lambda: local_margins(system)
+        yield "margin", lambda: system.local_margins()
         yield "simulate", lambda: sealag.simulate(system, duration=0.05)
         yield "export", lambda: mujoco_model(system)
 

@@ -13,9 +13,9 @@ import sealag
 from helpers.designs import EXAMPLES
 from sealag.design import System
 from sealag.errors import CertificateError
-from sealag.passivity import verify, write_certificate
+from sealag.passivity import Certificate
 from sealag.robot import Motion
-from sealag.walking import GroundProfile, plan_walk, walk_motion
+from sealag.walking import GroundProfile, WalkPlan
 from sealag.whole_body import MotorAngles, Tank
 
 
@@ -23,7 +23,7 @@ def plain(certificate: Any) -> dict[str, Any]:
     """What a certificate says once written and read again."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "c.json"
-        write_certificate(certificate, path)
+        certificate.write(path)
         return json.loads(path.read_text())
 
 
@@ -65,7 +65,7 @@ def made(name: str) -> dict[str, Any]:
 
 def half_a_step(system: System) -> Motion:
     """Forty instants of Hume's walk."""
-    whole = walk_motion(system.robot, plan_walk(GroundProfile.paper(), steps=2), rate=100.0)
+    whole = WalkPlan.over(GroundProfile.paper(), steps=2).motion(system.robot, rate=100.0)
     return whole.at(slice(0, 40))
 
 
@@ -93,6 +93,10 @@ def resealed(data: dict[str, Any]) -> dict[str, Any]:
 def failures(data: dict[str, Any], *, exact: bool = False) -> list[str]:
     """Names of the checks that fail although the digest agrees."""
     try:
-        return [check.name for check in verify(resealed(data), exact=exact).checks if not check.ok]
+        return [
+            check.name
+            for check in Certificate.verify(resealed(data), exact=exact).checks
+            if not check.ok
+        ]
     except CertificateError as error:
         return [f"unreadable: {error}"]

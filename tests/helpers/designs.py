@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from helpers.chains import chain
-from sealag.actuation import Actuators, actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Delays, Link, PacketOrder, RoundTrip, Sinusoid
 from sealag.robot import Robot
 
@@ -84,7 +84,7 @@ def random_arm(folder, seed):
         length=rng.uniform(0.2, 0.6),
         along="x",
     )
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints,
         spring_stiffness=rng.uniform(200, 1000, n),
         rotor_inertia=rng.uniform(0.05, 0.2, n),

@@ -14,7 +14,7 @@ import numpy as np
 
 from helpers.designs import EXAMPLES
 from sealag.design import load
-from sealag.walking import GroundProfile, begin_walk
+from sealag.walking import GroundProfile
 from sealag.whole_body import Controller, Measurement, Tank
 
 WARM, TICKS = 6_000, 10_000
@@ -39,7 +39,7 @@ def walking():
     """Return Hume's walking controller and the state at the apex, which it sees for ever."""
     system = load("bundled:hume")
     walk = replace(system.walking, ground=GroundProfile.flat())
-    start = begin_walk(system.robot, system.actuators, walk)
+    start = walk.begin(system.robot, system.actuators)
     measured = _measured(system.robot, start.q, start.v, 2)
     measured.contact[1] = 1.0
     return start.controller, measured

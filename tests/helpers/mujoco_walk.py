@@ -14,7 +14,6 @@ import numpy as np
 from helpers.mujoco_sea import MujocoRobot
 from humanoids2016 import WalkCase
 from sealag.design import System
-from sealag.walking import begin_walk
 from sealag.whole_body import Measurement
 
 TICK = 1e-3
@@ -222,7 +221,7 @@ class _Feet:
 def mujoco_walk(system: System, case: WalkCase, *, step: float) -> MujocoWalk:
     """Walk a case with MuJoCo as plant, at one of its steps (s)."""
     robot, springs = system.robot, system.actuators
-    start = begin_walk(robot, springs, case.walking)
+    start = case.walking.begin(robot, springs)
     controller = start.controller
     twin = MujocoRobot.build(
         robot, springs, step=step, feet=FEET, delay=LONGEST, friction=0.0,

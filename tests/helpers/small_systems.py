@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Delays, Link, RoundTrip
 from sealag.design import System
 from sealag.robot import load_robot
@@ -60,7 +60,7 @@ def arm_system(folder: Path, *, law=None, posture=None, springs=None, count=2, *
     law = law or Law(tasks=(joint_task(robot, 30.0),), stiffness_form="force")
     return System(
         robot=robot,
-        actuators=actuators(robot.joints, **motors),
+        actuators=Actuators.of(robot.joints, **motors),
         law=law,
         posture=np.array([0.3, -0.5])[:n] if posture is None else posture,
         delays=changes.pop("delays", constant_delays(0.002, 0.002)),

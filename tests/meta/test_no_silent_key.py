@@ -9,7 +9,6 @@ from pydantic import BaseModel
 
 import sealag
 from helpers.toml import to_toml
-from sealag.design import parse_project
 from sealag.errors import SealagError
 
 URDF = """<robot name="two">
@@ -175,8 +174,7 @@ def walk(kind: Any, path: str = "") -> set[str]:
 
 
 def schema_keys() -> set[str]:
-    project = parse_project(to_toml(BASE).encode(), "project.toml")
-    keys = walk(type(project))
+    keys = walk(type(sealag.load("bundled:hume").source.project))
     ways = {"central_up", "central_down", "embedded_round_trip", "embedded_up", "embedded_down"}
     inside = {key for key in keys if key.split(".")[0] == "delays" and key.split(".")[1] in ways}
     return (keys - inside) | {f"delays.{way}" for way in ways}

@@ -14,7 +14,8 @@ TESTS = {
            "tests/unit/test_whole_body_static_ticks.py "
            "tests/unit/test_whole_body_controller.py tests/unit/test_design_cases.py "
            "tests/oracle/test_black_box_corpus.py",
-    "margin": "tests/unit/test_margin_delay_margin.py tests/unit/test_margin_slow_crossings.py "
+    "margin": "tests/unit/test_margin_delay_margin.py tests/unit/test_design_drift.py "
+              "tests/unit/test_margin_slow_crossings.py "
               "tests/unit/test_margin_embedded_delay.py tests/unit/test_margin_at_most.py "
               "tests/unit/test_margin_bad_input.py tests/unit/test_margin_jitter.py "
               "tests/unit/test_margin_sampled.py "
@@ -157,9 +158,9 @@ MUTANTS = [
     ),
     *_of(
         "actuation", "actuation/_actuators.py",
-        ("ratio=own(actuators.rotor_inertia / actuators.shaped_inertia)",
-         "ratio=own(actuators.shaped_inertia / actuators.rotor_inertia)", "shaping upside down"),
-        ("viscous=own(actuators.viscous_friction)", "viscous=own(0.0)", "viscous friction"),
+        ("ratio=own(self.rotor_inertia / self.shaped_inertia)",
+         "ratio=own(self.shaped_inertia / self.rotor_inertia)", "shaping upside down"),
+        ("viscous=own(self.viscous_friction)", "viscous=own(0.0)", "viscous friction"),
         ("bearing=own(joint_damping)", "bearing=own(0.0)", "damping of the links' bearings"),
         ("moving = np.where(robot.velocity_limit > 0.0, robot.velocity_limit, np.inf)",
          "moving = robot.velocity_limit", "a speed limit of 0"),
@@ -186,7 +187,8 @@ MUTANTS = [
          "F_task = J_star.transpose(0, 2, 1) @ S @ J_star", "plain task errors"),
         ("contraction=static_contraction(F_q, K)", "contraction=static_contraction(F_task, K)",
          "contraction with fed-back gravity"),
-        ("asymmetry=relative_asymmetry(F_theta)", "asymmetry=relative_asymmetry(F_q)",
+        ("asymmetry=Spaces.relative_asymmetry(F_theta)",
+         "asymmetry=Spaces.relative_asymmetry(F_q)",
          "asymmetry on the motors' side"),
         ("lost |= (here < _ranks(robot, there, levels)).any(axis=1)",
          "lost |= (here < _ranks(robot, there, levels)).all(axis=1)", "singular postures"),
@@ -207,7 +209,7 @@ MUTANTS = [
     ),
     *_of(
         "law", "whole_body/_links.py",
-        ("out -= self._at.frame_jacobian(contact.frame)[: last - first].T @ force[first:last]",
+        ("out -= at.frame_jacobian(contact.frame)[: last - first].T @ force[first:last]",
          "first = last; continue", "contact forces in the links' stiffness"),
         ("H = others @ ((H + H.T) / 2.0) @ others", "H = (H + H.T) / 2.0", "rigid motions"),
         ("G[3:6, 3] = R.T[:, 2]", "G[3:6, 3] = R[:, 2]",
@@ -224,8 +226,8 @@ MUTANTS = [
          "damping of the links' bearings"),
         ("S.T @ (spring - drag) - at.take(at.z, H)", "S.T @ (spring - drag)",
          "stiffness of gravity and contacts"),
-        ("A_e=np.zeros_like(A_0) if embedded_delay is None else B @ (rows.shift[:, None] * spring)",
-         "A_e=np.zeros_like(A_0)", "late torque feedback"),
+        ("A_e = B @ (rows.shift[:, None] * spring) if late else np.zeros_like(A_0)",
+         "A_e = np.zeros_like(A_0)", "late torque feedback"),
         ("A_0[at.memory, at.theta_rate] = memory.B_rate", "pass", "x̂ that moves with the motors"),
         ("shift=(1.0 - ratio) / ratio", "shift=1.0 - ratio", "gain of late torque feedback"),
     ),
@@ -248,6 +250,8 @@ MUTANTS = [
     ),
     *_of(
         "margin", "margin/_margin.py",
+        ("drifting = int((roots.real > -_DRIFT).sum())",
+         "drifting = int((roots.real > _DRIFT).sum())", "zero roots by rounding"),
         ("return delay * crossing.frequency < 1e-9", "return delay * crossing.frequency < 1e-3",
          "a slow crossing taken for a zero root"),
         ("delay=0.0 if unstable else first", "delay=first", "margin of an unstable loop"),
@@ -404,8 +408,6 @@ MUTANTS = [
     *_of(
         "design", "design/_local.py",
         ("worst = min(known, key=_Known.order)", "worst = known[0]", "the rest's margin"),
-        ("drifting = int((rightmost.real > -_DRIFT).sum())",
-         "drifting = int((rightmost.real > _DRIFT).sum())", "zero roots by rounding"),
         ("if loop.bend > _BEND:", "if False:", "margin of a singular posture"),
         ("return int(self.unstable_roots.max())", "return int(self.unstable_roots[0])",
          "unstable instants"),
@@ -458,12 +460,14 @@ MUTANTS = [
         ("embedded_up=delays.embedded.up if late else None", "embedded_up=None",
          "late torque feedback that is not simulated"),
         ("embedded_period=clock.embedded", "embedded_period=0.0", "bound of a network"),
+        ("passed = np.sort(self.central_down.due(tick, arrival)) if looks is None else looks",
+         "passed = np.sort(tick) if looks is None else looks", "commands before they arrive"),
+        ("seen=np.maximum(seen, 0.0)", "seen=tick", "measurements without delay"),
+        ("known = np.minimum(link.sent(looks + 0.5 * clock.physics, rng), looks)",
+         "known = looks", "late torque feedback"),
     ),
     *_of(
         "simulation", "simulation/_exchange.py",
-        ("passed = np.sort(network.central_down.due(tick, arrival)) if looks is None else looks",
-         "passed = np.sort(tick) if looks is None else looks", "commands before they arrive"),
-        ("seen=np.maximum(seen, 0.0)", "seen=tick", "measurements without delay"),
         ("known = np.append(0.0, self.seen[self.command])",
          "known = np.append(0.0, self.tick[self.command])", "age of both together"),
         ("command=float((stop - sent)[ran].max())", "command=float((stop - sent)[ran].mean())",
@@ -471,8 +475,6 @@ MUTANTS = [
         ("measurement=float((self.tick - self.seen)[ticked].max())",
          "measurement=float((self.tick - self.seen)[ticked].mean())",
          "largest age of a measurement"),
-        ("known = np.minimum(link.sent(looks + 0.5 * clock.physics, rng), looks)",
-         "known = looks", "late torque feedback"),
     ),
     *_of(
         "simulation", "store.py",

@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 from helpers.mimics import MIMICS, random_mimics
-from sealag.robot import Contact, load_robot, resolve_urdf
+from helpers.robots import urdf_path
+from sealag.robot import Contact, load_robot
 
 SEED = 23
 PANDA = "panda_description/urdf/panda.urdf"
@@ -61,7 +62,7 @@ def pair(request, tmp_path):
         return Pair(path, floating_base=rng.random() < 0.5, mimics=mimics)
     if request.param == "panda":
         mimics = {"panda_finger_joint2": ("panda_finger_joint1", 1.0, 0.0)}
-        return Pair(resolve_urdf(f"example-robot-data:{PANDA}"), floating_base=False, mimics=mimics)
+        return Pair(urdf_path(f"example-robot-data:{PANDA}"), floating_base=False, mimics=mimics)
     path.write_text(MIMICS)
     return Pair(path, floating_base=request.param == "floating", mimics=OWN)
 
@@ -136,7 +137,7 @@ def test_configurations_are_the_leaders(pair):
 
 def test_panda_is_pinocchio_s_own_coupled_model():
     """Pinocchio couples followers that come after their leaders itself."""
-    path = resolve_urdf(f"example-robot-data:{PANDA}")
+    path = urdf_path(f"example-robot-data:{PANDA}")
     coupled = pin.buildModelFromUrdf(str(path), mimic=True)
     robot = load_robot(path, floating_base=False)
     q = np.linspace(-0.5, 0.6, robot.nq)
@@ -146,7 +147,7 @@ def test_panda_is_pinocchio_s_own_coupled_model():
 
 
 def test_followers_of_a_gripper_that_is_not_actuated_are_locked():
-    path = resolve_urdf(f"example-robot-data:{TIAGO}")
+    path = urdf_path(f"example-robot-data:{TIAGO}")
     every = load_robot(path, floating_base=False)
     assert len(every.followers) == 10
     arm = [name for name in every.joints if "finger" not in name]

@@ -7,14 +7,14 @@ import pytest
 from helpers.chains import chain, wheel
 from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Link
 from sealag.simulation import Clock, Network, Outcome, Scene, closed_loop
 
 
 def _springs(robot, **changes):
     values = {"spring_stiffness": 350.0, "rotor_inertia": 0.1, "motor_damping": 1e-12}
-    return actuators(robot.joints, **{**values, **changes})
+    return Actuators.of(robot.joints, **{**values, **changes})
 
 
 def test_free_spring_and_masses(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from helpers.controllers import JointPD
 from helpers.mujoco_sea import MujocoRobot
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Link
 from sealag.robot import Contact, load_robot
 from sealag.simulation import Clock, Foot, Network, Outcome, Scene, closed_loop
@@ -20,7 +20,7 @@ ROTOR = np.array([0.1357, 0.093, 0.093] * 2)
 @pytest.fixture(scope="module")
 def hume():
     robot = load_robot("bundled:hume.urdf", floating_base=True)
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints,
         spring_stiffness=1000.0,
         rotor_inertia=ROTOR,

@@ -13,7 +13,7 @@ import pytest
 from helpers.controllers import JointPD
 from helpers.designs import EXAMPLES
 from helpers.mujoco_sea import MujocoRobot
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Link
 from sealag.design import load
 from sealag.simulation import Clock, Network, Outcome, Push, Scene, closed_loop
@@ -39,7 +39,7 @@ class Case:
         n, rng = self.robot.n, np.random.default_rng(len(name))
         K = STIFFNESS[name] * rng.uniform(0.8, 1.2, n)
         inertia = rng.uniform(0.1, 0.2, n)
-        self.springs = actuators(
+        self.springs = Actuators.of(
             self.robot.joints, spring_stiffness=K, rotor_inertia=inertia,
             inertia_shaping=rng.uniform(0.4, 1.6, n), motor_damping=rng.uniform(5, 9, n),
             spring_damping=rng.uniform(0.1, 0.2, n),

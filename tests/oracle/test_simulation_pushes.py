@@ -5,7 +5,7 @@ import pytest
 
 from helpers.controllers import Constant as ConstantTorque
 from helpers.designs import EXAMPLES
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.design import load
 from sealag.simulation import Clock, Push, Scene, closed_loop
 
@@ -22,7 +22,7 @@ PUSHES = (
 def anymal():
     system = load(EXAMPLES / "anymal.toml")
     rng, n = np.random.default_rng(0), system.robot.n
-    springs = actuators(
+    springs = Actuators.of(
         system.robot.joints, spring_stiffness=rng.uniform(100, 300, n),
         rotor_inertia=rng.uniform(0.05, 0.1, n), inertia_shaping=0.5,
         motor_damping=rng.uniform(5, 20, n), spring_damping=0.1,

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import cumulative_simpson
 
 from helpers.chains import chain
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Link
 from sealag.simulation import Clock, Network, Push, Scene, closed_loop
 
@@ -46,7 +46,7 @@ class Pendulums:
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory):
     robot = chain(tmp_path_factory.mktemp("arm"), count=3, length=0.3)
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints,
         spring_stiffness=[350.0, 220.0, 140.0],
         rotor_inertia=[0.09, 0.05, 0.03],

@@ -18,7 +18,7 @@ from humanoids2016 import (
     study,
     write_paper_page,
 )
-from sealag.design import load, resolve_project
+from sealag.design import load
 
 pytestmark = pytest.mark.slow
 
@@ -39,7 +39,7 @@ class Links(HTMLParser):
                 self.outside.append(target)
 
 
-HUME = resolve_project("bundled:hume")
+HUME = load("bundled:hume").files[0]
 WALK = {
     "steps = 7": "steps = 3",
     "apex_speed = 0.5 ": "apex_speed = 0.45 ",

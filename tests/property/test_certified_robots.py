@@ -15,15 +15,14 @@ import numpy as np
 import pytest
 
 from helpers.designs import EXAMPLES
-from sealag.design import certified_bounds, load, margin_of
+from sealag.design import load
 from sealag.errors import SolverError
-from sealag.margin import rightmost_roots
+from sealag.margin import DelayMargin, rightmost_roots
 from sealag.passivity import Instant, Problem, solve
 from sealag.robot import Contact, ContactKind, Motion
 from sealag.whole_body import (
     FrozenLoop,
     GravityCompensation,
-    LinkPlant,
     MotorAngles,
     StaticJoint,
     Tank,
@@ -120,14 +119,14 @@ def bounds_of(name, signal, gravity):
         contact_index=np.zeros(DRAWS, dtype=np.int64),
     )
     spaces = system.spaces(motion)
-    certified, published = certified_bounds(spaces, system), printed_bounds(spaces, system)
+    certified, published = system.certified_bounds(spaces), printed_bounds(spaces, system)
     return system, motion, spaces, certified, published
 
 
 def at_minimum(system, motion, spaces, k):
     """Whether links, springs and law have a strict potential minimum, but for rigid motions."""
     robot, K = system.robot, np.diag(system.actuators.spring_stiffness)
-    links = LinkPlant(robot, system.contacts).free(motion.q[k], spaces.gravity[k])
+    links = FrozenLoop.free_links(robot, motion.q[k], spaces.gravity[k], contacts=system.contacts)
     S, F = links.Z[robot.nv_base :], spaces.F_theta[k]
     hessian = np.block([[links.H + S.T @ K @ S, -S.T @ K], [-K @ S, K + (F + F.T) / 2.0]])
     rigid = np.vstack([links.rigid, np.zeros((robot.n, links.rigid.shape[1]))])
@@ -151,7 +150,7 @@ def compared(name, signal, gravity, wanted):
             continue
         loop = system.frozen(motion, k, rest=system.in_posture(motion, k))
         try:
-            margin = margin_of(loop).delay
+            margin = DelayMargin.of_loop(loop).delay
         except SolverError:
             continue
         found.append(Compared(loop, margin, certified.delay[k], published.delay[k]))

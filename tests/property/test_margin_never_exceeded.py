@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from humanoids2016 import PlantComparison, compare_plant, random_sea_plant
 from sealag.margin import delay_margin
-from sealag.whole_body import SIGNAL_NAMES
+from sealag.whole_body import Signal
 
 PLANTS = 1000
 
@@ -23,7 +23,7 @@ def test_certified_and_stable_never_exceeds_the_margin(corpus: list[PlantCompari
     spoken = [one for one in corpus if one.certified_s is not None and one.margin_s is not None]
     assert len(spoken) > PLANTS // 4
     assert {len(one.plant.K) for one in spoken} == {1, 2, 3, 4, 5, 6}
-    counts = {name: sum(one.plant.signal.name == name for one in spoken) for name in SIGNAL_NAMES}
+    counts = {name: sum(one.plant.signal.name == name for one in spoken) for name in Signal.names()}
     assert counts.pop("joint") == 0
     assert min(counts.values()) > 50
     assert not any(one.certified_is_longer for one in corpus)

@@ -12,9 +12,8 @@ import pytest
 from helpers.designs import EXAMPLES
 from sealag.design import load, simulate
 from sealag.errors import SealagError
-from sealag.report import run_summary
 from sealag.simulation import Outcome
-from sealag.whole_body import SIGNAL_NAMES, GravityCompensation, signal_named
+from sealag.whole_body import GravityCompensation, Signal
 
 pytestmark = pytest.mark.slow
 
@@ -46,7 +45,7 @@ def _design(system, *, stiffness, signal, gravity, springs=1.0, damping=1.0):
     )
     return replace(
         system,
-        law=replace(system.law, tasks=tasks, signal=signal_named(signal), gravity=gravity),
+        law=replace(system.law, tasks=tasks, signal=Signal.named(signal), gravity=gravity),
         actuators=replace(
             motors,
             spring_stiffness=springs * motors.spring_stiffness,
@@ -64,7 +63,7 @@ def _drawn(system, rng):
     return _design(
         system,
         stiffness=[factor(-2, 3) for _ in system.law.tasks],
-        signal=str(rng.choice(SIGNAL_NAMES)),
+        signal=str(rng.choice(Signal.names())),
         gravity=rng.choice(list(GravityCompensation)),
         springs=factor(-2, 1),
         damping=factor(-3, 2),
@@ -101,7 +100,7 @@ def test_no_design_ends_in_a_traceback(name):
             ends["refused"] += 1
             continue
         assert bool(run.message) == (run.outcome is not Outcome.COMPLETED)
-        json.dumps(run_summary(run, recording=Path("run.mcap")), allow_nan=False)
+        json.dumps(run.summary(recording=Path("run.mcap")), allow_nan=False)
         ends["completed" if run.outcome is Outcome.COMPLETED else "ended"] += 1
     assert min(ends[end] for end in ("refused", "completed")) > 0
     assert (ends["ended"] > 0) == system.robot.floating_base

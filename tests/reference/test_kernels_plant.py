@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.kernels.ledger import COMMAND, DAMPING, MOTOR_WORK, PORT, SHAFT
 from sealag.robot import load_robot
 from sealag.simulation._plant import Plant
@@ -16,7 +16,7 @@ STEP = 1e-4
 def plant():
     """Hume in the air, moving, its springs loaded."""
     robot = load_robot("bundled:hume.urdf", floating_base=True)
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints,
         spring_stiffness=350.0,
         rotor_inertia=np.array([0.1357, 0.093, 0.093] * 2),

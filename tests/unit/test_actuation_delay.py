@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sealag.actuation import actuators, transparency
+from sealag.actuation import Actuators
 from sealag.delay import (
     Constant,
     Delays,
@@ -21,22 +21,22 @@ SPRING = {"spring_stiffness": 350.0, "rotor_inertia": 0.09, "motor_damping": 10.
 
 
 def test_bandwidth_is_where_half_the_power_passes():
-    joint = actuators(["a", "b"], **{**SPRING, "motor_damping": [1.0, 100.0]})
-    answer = transparency(joint, delay=0.01)
+    joint = Actuators.of(["a", "b"], **{**SPRING, "motor_damping": [1.0, 100.0]})
+    answer = joint.transparency(delay=0.01)
     s = 2j * np.pi * answer.bandwidth
     K, B_s, D = joint.spring_stiffness, joint.shaped_inertia, joint.motor_damping
     gain = np.abs(K / (B_s * s**2 + D * s + K))
     np.testing.assert_allclose(gain, np.sqrt(0.5), rtol=1e-12)
     assert answer.bandwidth[0] > answer.bandwidth[1], "damping costs bandwidth"
     np.testing.assert_allclose(answer.damping_ratio, D / (2.0 * np.sqrt(K * B_s)), rtol=1e-12)
-    critical = actuators(["a"], **{**SPRING, "motor_damping": 2.0 * np.sqrt(350.0 * 0.09)})
-    assert transparency(critical).damping_ratio[0] == pytest.approx(1.0)
-    slow = transparency(joint, delay=0.02)
+    critical = Actuators.of(["a"], **{**SPRING, "motor_damping": 2.0 * np.sqrt(350.0 * 0.09)})
+    assert critical.transparency().damping_ratio[0] == pytest.approx(1.0)
+    slow = joint.transparency(delay=0.02)
     np.testing.assert_allclose(slow.phase_lag - answer.phase_lag, 2 * np.pi * 0.01, rtol=1e-9)
 
 
 def test_inertia_shaping_is_a_factor():
-    joint = actuators(["a"], **SPRING, inertia_shaping=0.5)
+    joint = Actuators.of(["a"], **SPRING, inertia_shaping=0.5)
     assert joint.shaped_inertia[0] == 0.045
     assert joint.inertia_shaping[0] == 0.5
 
@@ -45,16 +45,16 @@ def test_inertia_shaping_is_a_factor():
 @pytest.mark.parametrize("key", SPRING)
 def test_bad_actuators_are_refused(key, bad):
     with pytest.raises(InputError, match=key):
-        actuators(["a"], **{**SPRING, key: bad})
+        Actuators.of(["a"], **{**SPRING, key: bad})
 
 
 @pytest.mark.parametrize("key", SPRING)
 def test_missing_and_unknown_quantities_are_named(key):
     rest = {name: value for name, value in SPRING.items() if name != key}
     with pytest.raises(InputError, match=f"{key} is missing"):
-        actuators(["a"], **rest)
+        Actuators.of(["a"], **rest)
     with pytest.raises(UnknownNameError, match="stifness"):
-        actuators(["a"], **SPRING, stifness=1.0)
+        Actuators.of(["a"], **SPRING, stifness=1.0)
 
 
 PAPER = Delays(

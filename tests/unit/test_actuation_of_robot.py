@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sealag.actuation import actuators_of, motors_of
+from sealag.actuation import Actuators
 from sealag.robot import load_robot
 
 DRIVES = {"spring_stiffness": [300.0, 120.0], "rotor_inertia": [0.1, 0.06], "motor_damping": 5.0}
@@ -35,14 +35,14 @@ def robot(tmp_path):
 
 
 def test_what_is_not_stated_is_the_urdf_s(robot):
-    drives = actuators_of(robot, **DRIVES)
+    drives = Actuators.of_robot(robot, **DRIVES)
     np.testing.assert_array_equal(drives.torque_limit, [7.0, 5.0])
     np.testing.assert_array_equal(drives.velocity_limit, [3.0, np.inf])
     np.testing.assert_array_equal(drives.coulomb_friction, [0.2, 0.1])
 
 
 def test_what_is_stated_stands_and_nan_leaves_it_to_the_urdf(robot):
-    drives = actuators_of(
+    drives = Actuators.of_robot(
         robot, **DRIVES, torque_limit=[np.nan, 9.0], velocity_limit=2.0, coulomb_friction=0.0
     )
     np.testing.assert_array_equal(drives.torque_limit, [7.0, 9.0])
@@ -51,11 +51,11 @@ def test_what_is_stated_stands_and_nan_leaves_it_to_the_urdf(robot):
 
 
 def test_kernels_get_every_quantity_of_its_joint(robot):
-    drives = actuators_of(
+    drives = Actuators.of_robot(
         robot, **DRIVES, inertia_shaping=[0.5, 2.0], viscous_friction=[0.3, 0.7],
         spring_damping=[0.01, 0.02], torque_bandwidth=[100.0, np.inf],
     )  # fmt: skip
-    motors = motors_of(drives, robot.damping)
+    motors = drives.motors(robot.damping)
     for name, values in {
         "stiffness": [300.0, 120.0], "inertia": [0.1, 0.06], "ratio": [2.0, 0.5],
         "damping": [5.0, 5.0], "viscous": [0.3, 0.7], "coulomb": [0.2, 0.1],

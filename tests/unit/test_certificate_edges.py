@@ -13,7 +13,7 @@ import pytest
 import sealag
 from helpers.certificates import failures, plain, resealed
 from sealag.delay import Constant, Delays, Table
-from sealag.passivity import Criterion, verify
+from sealag.passivity import Certificate, Criterion
 from sealag.robot import Contact, ContactKind
 from sealag.whole_body import MotorAngles, StiffnessForm, Task
 
@@ -108,7 +108,7 @@ def test_holds_and_no_longer_delay_does(name, criterion):
         assert data["status"] == "certified", data["reasons"]
     assert data["max_delay_upper_s"] <= data["max_delay_s"] * (1.0 + 2e-6)
     assert failures(data, exact=True) == []
-    checks = verify(resealed(data)).checks
+    checks = Certificate.verify(resealed(data)).checks
     doubtful = [check for check in checks if not check.ok]
     assert not doubtful or name == "straight legs"
     assert all("in doubt: --exact decides" in check.detail for check in doubtful)

@@ -10,12 +10,12 @@ import pytest
 
 from helpers.certificates import failures, made, resealed
 from sealag.errors import CertificateError
-from sealag.passivity import verify, write_certificate
+from sealag.passivity import Certificate
 
 
 def stated_only():
     """Keys that the documentation of `verify` names as stated and not proven."""
-    text = (verify.__doc__ or "").split("Stated, not proven")[1].split("Args:")[0]
+    text = (Certificate.verify.__doc__ or "").split("Stated, not proven")[1].split("Args:")[0]
     return set(re.findall(r"`(\w+)`", text))
 
 
@@ -30,7 +30,7 @@ def refused(tmp_path, text):
     tracemalloc.start()
     start = time.perf_counter()
     with pytest.raises(CertificateError) as error:
-        verify(path)
+        Certificate.verify(path)
     assert time.perf_counter() - start < 20.0
     assert tracemalloc.get_traced_memory()[1] < 1e8
     tracemalloc.stop()
@@ -44,7 +44,7 @@ def test_the_file_as_written_is_read(tmp_path):
     """The control of all that is refused below."""
     path = tmp_path / "c.json"
     path.write_text(text_of(made("baxter")))
-    assert verify(path).valid
+    assert Certificate.verify(path).valid
 
 
 TEXTS = {
@@ -301,5 +301,5 @@ def test_a_certificate_too_large_to_read_is_not_written(tmp_path):
         certificate, answer=replace(certificate.answer, reasons=("x" * 1_000_000,) * 101)
     )
     with pytest.raises(OSError, match="larger than 100 MB"):
-        write_certificate(long, tmp_path / "c.json")
+        long.write(tmp_path / "c.json")
     assert not (tmp_path / "c.json").exists()

@@ -12,8 +12,9 @@ import pytest
 
 import sealag
 from sealag.cli import main
-from sealag.design import certified_bounds, load, local_margins, margin_of
+from sealag.design import load
 from sealag.errors import SolverError
+from sealag.margin import DelayMargin
 from sealag.simulation import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -45,16 +46,16 @@ def growth(loop):
     ("name", "margin"), [("anymal", 87.4415), ("anymal_crawl", 73.6393), ("baxter", 107.6918)]
 )
 def test_margins_of_examples(name, margin):
-    found = local_margins(load(ROOT / "examples" / f"{name}.toml")).delay_s
+    found = load(ROOT / "examples" / f"{name}.toml").local_margins().delay_s
     assert found == pytest.approx(margin * 1e-3, abs=1e-7)
 
 
 def test_damping_of_a_urdf_acts():
     baxter = undamped(load(ROOT / "examples" / "baxter.toml"))
-    assert margin_of(baxter.frozen()).delay == pytest.approx(101.9631e-3, abs=1e-7)
+    assert DelayMargin.of_loop(baxter.frozen()).delay == pytest.approx(101.9631e-3, abs=1e-7)
     best = case("dampbest")
-    assert local_margins(best).delay_s == pytest.approx(52.286e-3, abs=1e-6)
-    assert local_margins(undamped(best)).delay_s == pytest.approx(62.687e-3, abs=1e-6)
+    assert best.local_margins().delay_s == pytest.approx(52.286e-3, abs=1e-6)
+    assert undamped(best).local_margins().delay_s == pytest.approx(62.687e-3, abs=1e-6)
 
 
 def test_followers_of_a_urdf_move_with_their_leaders():
@@ -72,18 +73,18 @@ def test_slow_drives_cost_margin(bandwidth, damped, margin):
     system = case("s2_torque_bandwidth_baxter")
     system = with_drives(system, torque_bandwidth=np.full(14, bandwidth))
     loop = (system if damped else undamped(system)).frozen()
-    assert margin_of(loop).delay == pytest.approx(margin * 1e-3, abs=5e-6)
+    assert DelayMargin.of_loop(loop).delay == pytest.approx(margin * 1e-3, abs=5e-6)
 
 
 def test_slow_drives_are_covered_by_no_bound():
     system = case("s2_torque_bandwidth_baxter")
-    bounds = certified_bounds(system.spaces(), system)
+    bounds = system.certified_bounds(system.spaces())
     assert bounds.delay[0] == 0.0
     assert "torque_bandwidth" in bounds.refusals[0]
     ideal = with_drives(
         system, torque_bandwidth=np.full(14, np.inf), torque_limit=np.full(14, np.inf)
     )
-    assert certified_bounds(ideal.spaces(), ideal).delay[0] > 0.09
+    assert ideal.certified_bounds(ideal.spaces()).delay[0] > 0.09
 
 
 # Unstable without delay ------------------------------------------------------------------------
@@ -98,7 +99,7 @@ def test_slow_drives_are_covered_by_no_bound():
 )
 def test_unstable_without_delay(name, modes, rate):
     system = case(name)
-    found = local_margins(system)
+    found = system.local_margins()
     assert (found.delay_s, found.unstable_modes) == (0.0, modes)
     assert growth(system.frozen()) == pytest.approx(rate, rel=2e-3)
     certificate = sealag.certify(system)
@@ -125,7 +126,7 @@ def test_a_tank_that_can_pay_drives_the_loop():
     """The loop of s5 is stable with an empty tank."""
     system = case("s5_tank_locally_active")
     empty = replace(system, law=replace(system.law, signal=replace(system.law.signal, energy=0.0)))
-    assert local_margins(empty).delay_s > 0.0
+    assert empty.local_margins().delay_s > 0.0
 
 
 # Limits, rests and singular postures -----------------------------------------------------------
@@ -179,7 +180,7 @@ def test_a_lost_direction_is_refused_and_bounded_beside_it():
     said = [one.text for one in answer.assumptions if one.key == "critical_instant"]
     assert "differs by 42.1%" in said[0]
     with pytest.raises(SolverError, match="no margin holds"):
-        local_margins(system)
+        system.local_margins()
     for angle in (0.001, 0.01):
         bent = system.posture.copy()
         bent[1] += angle
@@ -194,7 +195,7 @@ def test_the_loop_rests_elsewhere_with_another_margin():
     """Soft springs, motor angles: 13.9 ms in the posture, less where it sags to."""
     system = case("unclear_own_equilibrium")
     certificate = sealag.certify(system)
-    assert margin_of(system.frozen(rest=system.in_posture())).delay == pytest.approx(
+    assert DelayMargin.of_loop(system.frozen(rest=system.in_posture())).delay == pytest.approx(
         13.94e-3, abs=1e-5
     )
     assert certificate.answer.local_margin_s == pytest.approx(5.1275e-3, abs=1e-6)

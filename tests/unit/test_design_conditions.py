@@ -8,7 +8,6 @@ import pytest
 
 import sealag
 from helpers.small_systems import arm_system, constant_delays, joint_task
-from sealag.design import certified_bounds
 from sealag.robot import Contact, Motion
 from sealag.whole_body import Law, MotorAngles
 
@@ -34,11 +33,11 @@ def test_a_task_that_pushes_along_one_direction_is_refused_there(lowest, refused
     """Rounding of a direction without stiffness is none."""
     system, motion = moving(tmp_path, [0, 0, 0])
     spaces = system.spaces(motion)
-    assert (certified_bounds(spaces, system).delay > 0.0).all()
+    assert (system.certified_bounds(spaces).delay > 0.0).all()
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])
     F_task = spaces.F_task.copy()
     F_task[1] = turn @ np.diag([40.0, lowest]) @ turn.T
-    bound = certified_bounds(replace(spaces, F_task=F_task), system)
+    bound = system.certified_bounds(replace(spaces, F_task=F_task))
     assert (bound.delay == 0.0).tolist() == [False, refused, False]
     words = ("the task stiffness is indefinite at 1 of 3 instants",)
     assert bound.refusals == (words if refused else ())

@@ -8,15 +8,8 @@ import pytest
 
 import sealag
 from helpers.small_systems import arm, arm_system, joint_task
-from sealag.design import (
-    Along,
-    certified_bounds,
-    load,
-    load_motion,
-    local_margins,
-    local_of,
-    margin_of,
-)
+from sealag.design import load, load_motion
+from sealag.margin import DelayMargin
 from sealag.passivity import Basis
 from sealag.robot import Motion
 from sealag.whole_body import Law, MotorAngles, StaticJoint, Task
@@ -37,10 +30,10 @@ def one_instant(motion, k):
 
 def test_the_second_instant_decides_although_its_bound_is_the_longer():
     system, motion = second_instant()
-    first, second = (local_margins(system, one_instant(motion, k)) for k in (0, 1))
+    first, second = (system.local_margins(one_instant(motion, k)) for k in (0, 1))
     assert second.delay_s == pytest.approx(0.597454, abs=1e-6)
     assert first.delay_s > 1.2 * second.delay_s
-    both = local_margins(system, motion)
+    both = system.local_margins(motion)
     assert both.instant == 1
     assert both.time_s == 1.0
     assert both.delay_s == pytest.approx(second.delay_s, rel=1e-9)
@@ -50,14 +43,14 @@ def test_the_second_instant_decides_although_its_bound_is_the_longer():
     assert certificate.answer.local_margin_s == pytest.approx(second.delay_s, rel=1e-9)
     assert certificate.answer.worst.instant == 0
     turned = replace(motion, contact_index=motion.contact_index[::-1].copy())
-    assert local_margins(system, turned).instant == 0
+    assert system.local_margins(turned).instant == 0
 
 
 def test_at_that_instant_alone_the_loop_in_the_posture_is_what_is_597_ms():
     """The tasks there have no error; what supports it does."""
     system, motion = second_instant()
     loop = system.frozen(motion, 1, rest=system.in_posture(motion, 1))
-    assert margin_of(loop).delay == pytest.approx(0.597454, abs=1e-6)
+    assert DelayMargin.of_loop(loop).delay == pytest.approx(0.597454, abs=1e-6)
 
 
 def swinging(folder, *, count=40, signal=None, gravity="planned", tasks=None):
@@ -81,9 +74,9 @@ def swinging(folder, *, count=40, signal=None, gravity="planned", tasks=None):
 
 def decided(system, motion, *, share=1.0, refuse=False):
     """What is known, with bounds that are scaled, or taken away."""
-    bounds = certified_bounds(system.spaces(motion), system)
+    bounds = system.certified_bounds(system.spaces(motion))
     delay = 0.0 * bounds.delay if refuse else share * bounds.delay
-    return local_of(Along(system=system, motion=motion), delay), bounds
+    return system.along(motion).local(delay), bounds
 
 
 @pytest.mark.parametrize("gravity", ["feedback", "planned"])
@@ -92,7 +85,7 @@ def test_what_bounds_decide_agrees_with_deciding_all(tmp_path, gravity):
     pruned, bounds = decided(system, motion)
     whole, _ = decided(system, motion, refuse=True)
     assert whole.count(Basis.EXACT) == len(motion)
-    each = [margin_of(system.frozen(motion, k)).delay for k in range(len(motion))]
+    each = [DelayMargin.of_loop(system.frozen(motion, k)).delay for k in range(len(motion))]
     np.testing.assert_allclose(whole.delay, each, rtol=1e-9)
     assert 0 < pruned.count(Basis.EXACT) < len(motion) / 4
     assert pruned.count(Basis.SEARCHED) > 0
@@ -117,7 +110,7 @@ def test_bounds_that_are_too_long_hide_the_critical_instant(tmp_path):
     whole, bounds = decided(system, motion, refuse=True)
     wrong = bounds.delay.copy()
     wrong[whole.critical] *= 100.0
-    hidden = local_of(Along(system=system, motion=motion), wrong)
+    hidden = system.along(motion).local(wrong)
     assert hidden.critical != whole.critical
     assert hidden.margin_s > whole.margin_s
 
@@ -161,7 +154,9 @@ def test_one_unstable_instant_makes_the_motion_unstable(tmp_path):
     turning[:, 0] = np.linspace(1.5, -1.5, 12)
     motion = replace(motion, q=turning)
     local, _ = decided(system, motion)
-    each = [margin_of(system.frozen(motion, k)).unstable_roots for k in range(len(motion))]
+    each = [
+        DelayMargin.of_loop(system.frozen(motion, k)).unstable_roots for k in range(len(motion))
+    ]
     assert 0 in each
     assert max(each) > 0
     assert local.unstable_roots.tolist() == each

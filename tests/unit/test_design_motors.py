@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from helpers.small_systems import arm_system, joint_task
-from sealag.design import certified_bounds
 from sealag.whole_body import GravityCompensation, Law, MotorAngles
 
 PLANNED, NONE = GravityCompensation.PLANNED, GravityCompensation.NONE
@@ -22,7 +21,7 @@ def held(folder, gravity):
 def refusals(system, motion=None, **limits):
     limited = replace(system, actuators=replace(system.actuators, **limits))
     rest = limited.rest() if motion is None else None
-    return certified_bounds(limited.spaces(motion), limited, rest, motion).refusals
+    return limited.certified_bounds(limited.spaces(motion), rest, motion).refusals
 
 
 @pytest.mark.parametrize("gravity", [PLANNED, NONE])

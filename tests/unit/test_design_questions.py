@@ -6,7 +6,7 @@ import pytest
 import sealag
 from sealag.errors import InputError
 from sealag.passivity import max_delay
-from sealag.robot import load_robot, require_within_limits
+from sealag.robot import load_robot
 
 EYE, ONES = np.eye(3), np.ones(3)
 
@@ -51,6 +51,6 @@ def test_questions_that_cannot_be(name):
 def test_positions_outside_limits():
     robot = load_robot("bundled:hume.urdf", floating_base=True)
     q = robot.configuration({"left_knee": float(robot.position_upper[-1])})
-    require_within_limits(robot, [q, q])
+    robot.require_within_limits([q, q])
     with pytest.raises(InputError, match="row 2"):
-        require_within_limits(robot, [q, robot.configuration({"left_knee": 55.0})])
+        robot.require_within_limits([q, robot.configuration({"left_knee": 55.0})])

@@ -7,7 +7,6 @@ import pytest
 import sealag
 from helpers.designs import EXAMPLES
 from sealag.delay import Constant, Link
-from sealag.design import local_margins, rate_sweep
 from sealag.errors import InputError
 
 
@@ -22,7 +21,7 @@ def anymal(way=0.009):
 
 def test_each_rate_costs_half_a_period():
     exact = local_margins(anymal()).delay_s
-    for rate in rate_sweep(anymal(), [50.0, 100.0]):
+    for rate in anymal().rate_sweep([50.0, 100.0]):
         assert rate.way_s == pytest.approx(0.009)
         assert rate.stable is True
         if rate.margin.delay is not None:
@@ -31,7 +30,7 @@ def test_each_rate_costs_half_a_period():
 
 
 def test_a_way_between_two_margins_needs_the_faster_rate():
-    rates = {rate.rate_hz: rate.stable for rate in rate_sweep(anymal(way=0.080), [50.0, 100.0])}
+    rates = {rate.rate_hz: rate.stable for rate in anymal(way=0.080).rate_sweep([50.0, 100.0])}
     assert rates[50.0] is False
     assert rates[100.0] is True
 
@@ -39,11 +38,11 @@ def test_a_way_between_two_margins_needs_the_faster_rate():
 def test_the_design_s_own_rate_is_among_them():
     system = anymal()  # 333 Hz is lifted: 30 commands of 10 signals
     odd = replace(system, delays=replace(system.delays, sample_time=1.0 / 333.0))
-    assert 333.0 in {rate.rate_hz for rate in rate_sweep(odd, [100.0])}
+    assert 333.0 in {rate.rate_hz for rate in odd.rate_sweep([100.0])}
 
 
 def test_late_torque_feedback_is_a_second_delay():
     system = sealag.load(EXAMPLES / "anymal.toml")
     late = replace(system, delays=replace(system.delays, delayed_torque_feedback=True))
     with pytest.raises(InputError, match="delayed_torque_feedback"):
-        rate_sweep(late)
+        late.rate_sweep()

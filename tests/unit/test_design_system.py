@@ -8,9 +8,10 @@ import pytest
 
 import sealag
 from helpers.small_systems import arm, arm_system, constant_delays, joint_task
-from sealag.actuation import actuators
-from sealag.design import System, load, local_margins, margin_of
+from sealag.actuation import Actuators
+from sealag.design import System, load
 from sealag.errors import InputError, UnknownNameError
+from sealag.margin import DelayMargin
 from sealag.robot import Contact, Motion, load_robot
 from sealag.simulation import Outcome
 from sealag.whole_body import Law, Measurement, StaticJoint, Task
@@ -34,10 +35,10 @@ def test_it_answers_every_question_without_a_file(system):
     F_q = 30.0 * np.eye(2) - system.robot.gravity_gradient(system.posture)
     series = np.linalg.inv(np.linalg.inv(F_q) - np.diag(1.0 / system.actuators.spring_stiffness))
     np.testing.assert_allclose(spaces.F_theta[0], series, rtol=1e-6, atol=1e-6)
-    margin = margin_of(loop).delay
+    margin = DelayMargin.of_loop(loop).delay
     assert certificate.answer.max_delay_s < margin
     assert certificate.answer.local_margin_s == pytest.approx(margin, rel=1e-9)
-    assert local_margins(system).delay_s == pytest.approx(margin, rel=1e-9)
+    assert system.local_margins().delay_s == pytest.approx(margin, rel=1e-9)
     assert certificate.question.delay_s == system.delays.d_1
     run = system.simulate(scenario="regulate", duration=0.05)
     assert run.outcome is Outcome.COMPLETED
@@ -99,7 +100,7 @@ embedded_round_trip = { kind = "constant", value_ms = 2.0 }
 
 def test_hume_in_fifteen_lines():
     robot = load_robot("bundled:hume.urdf", floating_base=True)
-    drives = actuators(
+    drives = Actuators.of(
         robot.joints, spring_stiffness=1500.0, rotor_inertia=0.1, motor_damping=40.0,
         torque_limit=100.0,
     )  # fmt: skip
@@ -137,7 +138,7 @@ def test_a_motion_s_instants_have_loops_of_their_own(system):
 
 def test_parts_that_do_not_fit_are_refused_in_a_sentence(tmp_path, system):
     robot = system.robot
-    other = actuators(
+    other = Actuators.of(
         ("elbow", "wrist"), spring_stiffness=300.0, rotor_inertia=0.1, motor_damping=10.0
     )
     with pytest.raises(InputError, match=r"elbow, wrist, the robot's joints are joint0, joint1"):

@@ -10,7 +10,6 @@ import pytest
 import sealag
 from helpers.certificates import failures, plain
 from helpers.small_systems import arm_system, joint_task
-from sealag.design import certified_bounds
 from sealag.robot import Motion
 from sealag.whole_body import Law, MotorAngles
 
@@ -33,7 +32,7 @@ def unlike(folder, ratio):
 
 def test_no_delay_is_certified_without_a_proof(tmp_path):
     system, motion = unlike(tmp_path, 1e10)
-    found = certified_bounds(system.spaces(motion), system, None, motion)
+    found = system.certified_bounds(system.spaces(motion), None, motion)
     np.testing.assert_allclose(found.delay, 1.0 / RATE, rtol=1e-5)
     answer = sealag.certify(system, motion).answer
     assert answer.status == "not_certified"

@@ -12,7 +12,7 @@ import pytest
 
 import sealag
 from helpers.designs import EXAMPLES
-from sealag.design import load, local_margins
+from sealag.design import load
 
 HERE = str(Path(__file__).parent)
 DESIGNS = ("anymal", "baxter")
@@ -27,7 +27,7 @@ def answers(name):
 def told(system):
     certificate = sealag.certify(system)
     run = sealag.simulate(system, duration=0.02)
-    margin = local_margins(system)
+    margin = system.local_margins()
     return certificate.answer.max_delay_s, margin.delay_s, run.q.tobytes(), run.tau_sea.tobytes()
 
 

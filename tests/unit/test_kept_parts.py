@@ -11,7 +11,7 @@ import sealag
 from helpers.source import ROOT
 from sealag.kernels import dynamics, keep
 from sealag.robot import load_robot
-from sealag.whole_body import Controller, Measurement, signal_named
+from sealag.whole_body import Controller, Measurement, Signal
 
 CALLS = 200
 
@@ -63,7 +63,7 @@ def test_ticks_leave_nothing_behind(signal):
     system = sealag.load(str(ROOT / "examples/anymal.toml"))
     robot = system.robot
     controller = Controller(
-        robot, replace(system.law, signal=signal_named(signal)), system.actuators,
+        robot, replace(system.law, signal=Signal.named(signal)), system.actuators,
         contacts=system.contacts, posture=system.posture,
     )  # fmt: skip
     seen, out = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n), np.zeros(robot.n)

@@ -7,12 +7,12 @@ import pytest
 
 import sealag
 from helpers.small_systems import arm_system
-from sealag.design import load, local_margins
+from sealag.design import load
 from sealag.errors import InputError
-from sealag.passivity import verify
+from sealag.passivity import Certificate
 from sealag.report import read_recording, write_run
 from sealag.robot import Motion
-from sealag.simulation import Clock, Exchanges, Network
+from sealag.simulation import Clock, Network
 from sealag.store import blocks
 from sealag.whole_body import Law, StaticJoint, Task
 
@@ -51,7 +51,7 @@ def test_blocks_of_a_run_are_its_rows():
 
 def test_too_many_packets_are_refused_before_their_ways_are_planned():
     with pytest.raises(InputError, match=r"1e\+09 packets.*simulate for at most 20000 s"):
-        Exchanges.plan(Network.ideal(), Clock(), duration=1e6, seed=0)
+        Network.ideal().plan(Clock(), duration=1e6, seed=0)
     system = load("bundled:hume")
     with pytest.raises(InputError, match="packets"):
         sealag.simulate(system, scenario="balance", duration=1e6, log_period=1e3)
@@ -79,8 +79,8 @@ def test_a_motion_of_several_blocks_is_certified_as_in_one(
     system, motion = swinging
     parted = sealag.certify(system, motion, criterion=criterion)
     path = tmp_path / "parted.json"
-    sealag.write_certificate(parted, path)
-    assert verify(path).valid
+    parted.write(path)
+    assert Certificate.verify(path).valid
     monkeypatch.setattr("sealag.store.BLOCK", 1000)
     whole = sealag.certify(system, motion, criterion=criterion)
     assert np.ptp(whole.evidence.bounds_s) > 0.01 * whole.answer.max_delay_s
@@ -90,9 +90,9 @@ def test_a_motion_of_several_blocks_is_certified_as_in_one(
 
 def test_a_margin_of_several_blocks_is_that_of_one(swinging, monkeypatch):
     system, motion = swinging
-    parted = local_margins(system, motion)
+    parted = system.local_margins(motion)
     monkeypatch.setattr("sealag.store.BLOCK", 1000)
-    assert parted == local_margins(system, motion)
+    assert parted == system.local_margins(motion)
 
 
 def test_what_fails_in_a_later_block_is_counted_over_all(swinging):

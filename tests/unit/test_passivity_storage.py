@@ -11,7 +11,7 @@ import pytest
 from helpers.chains import chain
 from helpers.controllers import StoringPD
 from helpers.levels import instant_bound
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Link
 from sealag.simulation import Network, closed_loop
 
@@ -116,7 +116,7 @@ def test_energy_rises_where_the_published_bound_is_unsafe():
 def test_the_audit_books_the_same_storage_functions(tmp_path):
     """V_1, V_2, V_3 of every logged instant, and S_j = V_1 + V_2 behind the joint side's slack."""
     robot = chain(tmp_path, count=2)
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints,
         spring_stiffness=np.array([350.0, 200.0]),
         rotor_inertia=np.array([0.09, 0.04]),

@@ -10,15 +10,15 @@ from helpers.chains import Damped, chain, planar_arm, wheel
 from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD
 from helpers.designs import EXAMPLES
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.design import load, simulate
 from sealag.errors import InputError
-from sealag.simulation import Clock, Outcome, closed_loop, fastest_link
+from sealag.simulation import Clock, Outcome, closed_loop
 
 
 def _springs(robot, **changes):
     values = {"spring_stiffness": 350.0, "rotor_inertia": 0.1, "motor_damping": 1.0}
-    return actuators(robot.joints, **{**values, **changes})
+    return Actuators.of(robot.joints, **{**values, **changes})
 
 
 @pytest.mark.parametrize("damping", [0.0, 3.0, 60.0])
@@ -68,7 +68,7 @@ def test_each_joint_s_own_damping_is_in_the_books(tmp_path):
 @pytest.mark.parametrize(("spring", "joint"), [(0.0, 0.0), (2.0, 1.0), (70.0, 30.0), (0.0, 400.0)])
 def test_the_fastest_link_is_that_of_its_closed_form(tmp_path, spring, joint):
     robot = Damped(wheel(tmp_path, inertia=0.5), np.array([joint]))
-    rate, name = fastest_link(robot, _springs(robot, spring_damping=spring), np.zeros(1))
+    rate, name = _springs(robot, spring_damping=spring).fastest_link(robot, np.zeros(1))
     assert rate == pytest.approx(np.abs(np.roots([0.5, spring + joint, 350.0])).max())
     assert name == "joint0"
 
@@ -78,9 +78,9 @@ def test_the_fastest_link_is_named(tmp_path):
     for k, name in enumerate(robot.joints):
         K = np.full(3, 50.0)
         K[k] = 5e4
-        assert fastest_link(robot, _springs(robot, spring_stiffness=K), np.zeros(3))[1] == name
+        assert _springs(robot, spring_stiffness=K).fastest_link(robot, np.zeros(3))[1] == name
         damped = _springs(robot, spring_stiffness=50.0, spring_damping=K / 10)
-        assert fastest_link(robot, damped, np.zeros(3))[1] == name
+        assert damped.fastest_link(robot, np.zeros(3))[1] == name
 
 
 class TestStiffDamping:
@@ -106,7 +106,7 @@ class TestStiffDamping:
         stiff = replace(
             system, actuators=replace(system.actuators, spring_damping=np.full(14, 50.0))
         )
-        rates = [fastest_link(s.robot, s.actuators, s.posture)[0] for s in (system, stiff)]
+        rates = [s.actuators.fastest_link(s.robot, s.posture)[0] for s in (system, stiff)]
         assert rates[1] > 3 * rates[0]
         assert rates[1] * 1e-3 > 2.0, "1 ms, which the springs alone would allow, must not do"
         run = simulate(stiff, scenario="balance", duration=0.3)
@@ -118,7 +118,7 @@ class TestStiffDamping:
         robot = planar_arm(tmp_path, count=2, mass=1.0, inertia=1e-3, length=0.5)
         springs = _springs(robot, spring_stiffness=[4000.0, 4000.0], motor_damping=5.0)
         slow, fast = np.array([0.0, np.pi / 2]), np.array([0.0, 0.0])
-        rates = [fastest_link(robot, springs, q)[0] for q in (slow, fast)]
+        rates = [springs.fastest_link(robot, q)[0] for q in (slow, fast)]
         print(rates)
         assert rates[1] > 1.5 * rates[0]
         step = 1.9 / rates[0]

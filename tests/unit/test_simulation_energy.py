@@ -9,7 +9,7 @@ import pytest
 from helpers.chains import planar_arm, wheel
 from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD, StoringPD
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Link, PacketOrder, Sinusoid
 from sealag.robot import Contact
 from sealag.simulation import (
@@ -35,7 +35,7 @@ def _standing(robot, clearance=0.0):
 
 
 def _everything(robot):
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints,
         spring_stiffness=1000.0,
         rotor_inertia=ROTOR,
@@ -67,7 +67,7 @@ def _everything(robot):
 
 def test_nothing_lost_on_a_held_foot(hume):
     """No damping, friction, impact or delay: 1e-6 of the throughput, at fourth order."""
-    springs = actuators(
+    springs = Actuators.of(
         hume.joints, spring_stiffness=1000.0, rotor_inertia=ROTOR, motor_damping=1e-12
     )
     q = _standing(hume)
@@ -95,7 +95,9 @@ def test_nothing_lost_on_a_held_foot(hume):
 
 def test_rounding_of_stores_at_rest_is_no_open_book(hume):
     q = _standing(hume)
-    springs = actuators(hume.joints, spring_stiffness=1e3, rotor_inertia=ROTOR, motor_damping=1.0)
+    springs = Actuators.of(
+        hume.joints, spring_stiffness=1e3, rotor_inertia=ROTOR, motor_damping=1.0
+    )
     run = closed_loop(hume, springs, JointPD(q[-6:], stiffness=200.0), q=q, duration=0.01)
     stored = np.abs(list(run.audit.stores.values())).sum(axis=0).max()
     ones = np.ones_like(run.time)
@@ -162,7 +164,7 @@ class TestPassivityObserver:
 
     def _run(self, folder, delay, duration=1.0):
         robot = wheel(folder, inertia=1.0)
-        springs = actuators(
+        springs = Actuators.of(
             robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=10.0
         )
         none = Link(delay=Constant(value=0.0))
@@ -208,7 +210,7 @@ class TestPassivityObserver:
     def test_the_work_of_a_push_is_nobody_s_activity(self, tmp_path):
         """The joint side stores what a push gives; without that in its books it looks active."""
         robot = planar_arm(tmp_path, count=2, mass=1.0, inertia=0.05, length=0.4)
-        springs = actuators(
+        springs = Actuators.of(
             robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=[10.0, 8.0]
         )
         push = Push(frame="link1", force=(0.0, 60.0, 60.0), start=0.1, duration=0.1)
@@ -232,7 +234,7 @@ class TestPassivityObserver:
         robot = planar_arm(tmp_path, count=2, mass=1e-3, inertia=1.0, length=1e-3)
         stiffness = np.full(2, 5.0)
         stiffness[guilty] = 100.0
-        springs = actuators(
+        springs = Actuators.of(
             robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=[10.0, 8.0]
         )
         none = Link(delay=Constant(value=0.0))
@@ -258,7 +260,7 @@ class TestPassivityObserver:
         robot = planar_arm(tmp_path, count=2, mass=1e-3, inertia=1.0, length=1e-3)
         limit = np.full(2, 1e3)
         limit[weak] = 0.5
-        springs = actuators(
+        springs = Actuators.of(
             robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=[10.0, 8.0]
         )
         speed = np.array([0.9, 0.9])
@@ -278,7 +280,7 @@ class TestPassivityObserver:
 
     def test_no_statement_without_storage(self, tmp_path):
         robot = wheel(tmp_path)
-        springs = actuators(
+        springs = Actuators.of(
             robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=10.0
         )
         run = closed_loop(robot, springs, ConstantTorque([1.0]), q=np.zeros(1), duration=0.05)
@@ -294,7 +296,7 @@ class TestPassivityObserver:
                 return 0.5 * super().storage(t, measurement, command)
 
         robot = wheel(tmp_path, inertia=1.0)
-        springs = actuators(
+        springs = Actuators.of(
             robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=10.0
         )
         run = closed_loop(

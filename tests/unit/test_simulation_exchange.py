@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from helpers.chains import wheel
 from helpers.controllers import JointPD
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import (
     Constant,
     Delays,
@@ -17,7 +17,7 @@ from sealag.delay import (
     Sinusoid,
     Table,
 )
-from sealag.simulation import Clock, Exchanges, Network, closed_loop
+from sealag.simulation import Clock, Network, closed_loop
 
 CENTRAL = 2e-3
 
@@ -65,7 +65,7 @@ def _ages(delays, seed=0, duration=0.4):
     clock = Clock(physics=1e-3, central=delays.sample_time, embedded=delays.embedded_period)
     network = Network.from_delays(delays)
     assert network.delay_bound(clock) == pytest.approx(delays.d_1, rel=1e-12)
-    return Exchanges.plan(network, clock, duration=duration, seed=seed).ages(duration)
+    return network.plan(clock, duration=duration, seed=seed).ages(duration)
 
 
 @settings(max_examples=600, deadline=None)
@@ -122,7 +122,7 @@ def test_links_are_the_delays_own():
     assert (network.central_up, network.central_down) == (way["a"], way["b"])
     assert (network.embedded_up, network.embedded_down) == (way["c"], way["d"])
     assert Network.from_delays(Delays(**ways)).embedded_up is None
-    plan = Exchanges.plan(network, Clock(physics=1e-3, central=CENTRAL), duration=0.1, seed=0)
+    plan = network.plan(Clock(physics=1e-3, central=CENTRAL), duration=0.1, seed=0)
     np.testing.assert_allclose((plan.tick - plan.seen)[5:], 1e-3)
     np.testing.assert_allclose(plan.taken - plan.tick[plan.command], 6e-3)
     middle = 1e-3 * np.arange(len(plan.torque)) + 0.5e-3
@@ -133,7 +133,7 @@ def test_ages_do_not_depend_on_where_the_run_ends():
     """From the first full hold on: 0.4 of a period more or less changes nothing."""
     delays = _delays(*(Link(delay=Constant(d)) for d in (1.3e-3, 2.1e-3, 0.7e-3)))
     clock, network = Clock(physics=1e-4, central=CENTRAL), Network.from_delays(delays)
-    plan = Exchanges.plan(network, clock, duration=0.1, seed=0)
+    plan = network.plan(clock, duration=0.1, seed=0)
     ends = np.linspace(0.02, 0.1, 201)
     assert np.ptp([plan.ages(end).total for end in ends]) < 1e-12
     assert plan.ages(0.004).total < 0.9 * delays.d_1  # not yet full
@@ -152,7 +152,7 @@ class _Recorder(JointPD):
 
 def _run(folder, delays, physics):
     robot = wheel(folder)
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0,
         inertia_shaping=0.5,
     )  # fmt: skip

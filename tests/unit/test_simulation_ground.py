@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from helpers.controllers import JointPD
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.errors import InputError
 from sealag.robot import Contact, ContactKind, load_robot
 from sealag.simulation import Clock, Foot, Outcome, Push, Scene, closed_loop
@@ -35,7 +35,7 @@ class SlopeWithNormal(Slope):
 
 
 def _run(robot, ground, friction, duration=0.2):
-    springs = actuators(
+    springs = Actuators.of(
         robot.joints,
         spring_stiffness=1000.0,
         rotor_inertia=0.1,
@@ -106,7 +106,7 @@ class TestSoles:
         q = robot.configuration(knees)
         q[2] -= min(robot.frame_placement(sole, q)[1][2] for sole in self.soles)
         strong = np.array(["leg" in joint or "torso" in joint for joint in robot.joints])
-        springs = actuators(
+        springs = Actuators.of(
             robot.joints,
             spring_stiffness=np.where(strong, 3000.0, 50.0),
             rotor_inertia=0.1,
@@ -154,7 +154,7 @@ class TestSoles:
 
 
 def test_a_step_too_long_for_a_light_link_is_refused(hume):
-    springs = actuators(hume.joints, spring_stiffness=1e6, rotor_inertia=0.1, motor_damping=20.0)
+    springs = Actuators.of(hume.joints, spring_stiffness=1e6, rotor_inertia=0.1, motor_damping=20.0)
     controller = JointPD(np.zeros(6), stiffness=0.0)
     options = {"q": hume.neutral(), "duration": 0.01}
     with pytest.raises(InputError, match=r"step of 1 ms is too long.*simulation\.physics_step_ms"):

@@ -8,7 +8,7 @@ import pytest
 from helpers.chains import chain, wheel
 from helpers.controllers import Constant as ConstantTorque
 from helpers.controllers import JointPD
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Link
 from sealag.errors import ContractionError, InputError, SolverError, UnknownNameError
 from sealag.robot import Contact, ContactKind
@@ -28,7 +28,7 @@ FEET = ("left_foot", "right_foot")
 
 @pytest.fixture(scope="module")
 def springs(hume):
-    return actuators(
+    return Actuators.of(
         hume.joints,
         spring_stiffness=1000.0,
         rotor_inertia=0.1,
@@ -130,7 +130,7 @@ class TestRefused:
 
     def test_actuators_of_another_robot(self, hume, tmp_path):
         robot = wheel(tmp_path)
-        other = actuators(["x"], spring_stiffness=1, rotor_inertia=1, motor_damping=1)
+        other = Actuators.of(["x"], spring_stiffness=1, rotor_inertia=1, motor_damping=1)
         with pytest.raises(InputError, match="actuators are for joints"):
             closed_loop(robot, other, ConstantTorque([0.0]), q=np.zeros(1), duration=0.1)
 

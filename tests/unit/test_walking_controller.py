@@ -11,7 +11,7 @@ from sealag.design import load
 from sealag.errors import InputError
 from sealag.kernels import walking as kernel
 from sealag.simulation import Outcome
-from sealag.walking import GroundProfile, WalkingGait, WalkingOptions, begin_walk
+from sealag.walking import GroundProfile, WalkingGait, WalkingOptions
 from sealag.whole_body import Measurement
 
 PENDULUM = from_python(kernel.pendulum)
@@ -43,7 +43,7 @@ def test_periodic_gait_is_periodic(change):
 def test_start_is_the_apex(hume):
     """Feet, CoM, speed and vertical angular momentum of the first state."""
     walking, robot = replace(hume.walking, ground=GroundProfile.flat(0.1)), hume.robot
-    gait, start = walking.gait, begin_walk(robot, hume.actuators, walking)
+    gait, start = walking.gait, walking.begin(robot, hume.actuators)
     q, v = start.q, start.v
     np.testing.assert_allclose(start.theta_dot, v[-robot.n :])
     at = robot.workspace()
@@ -54,7 +54,7 @@ def test_start_is_the_apex(hume):
     np.testing.assert_allclose(at.frame_velocity("right_foot")[:3], 0.0, atol=1e-9)
     assert (at.centroidal_map() @ v)[5] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(InputError, match="com_height"):
-        begin_walk(robot, hume.actuators, replace(walking, gait=replace(gait, com_height=1.2)))
+        replace(walking, gait=replace(gait, com_height=1.2)).begin(robot, hume.actuators)
 
 
 def test_refusals(hume):
@@ -73,7 +73,7 @@ def test_refusals(hume):
         InputError, match=r"walking\.options\.preview is 1; it must be true or false"
     ):
         WalkingOptions(preview=1)
-    controller = begin_walk(hume.robot, hume.actuators, hume.walking).controller
+    controller = hume.walking.begin(hume.robot, hume.actuators).controller
     robot = hume.robot
     both = Measurement.allocate(nq=robot.nq, nv=robot.nv, n=robot.n, contacts=2)
     both.contact[:] = 1.0

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from sealag.errors import InputError, RobotError
 from sealag.robot import load_robot
-from sealag.walking import GroundProfile, plan_walk, walk_motion
+from sealag.walking import GroundProfile, WalkPlan
 
 HUME = load_robot("bundled:hume.urdf", floating_base=True)
 FEET = ("left_foot", "right_foot")
@@ -17,7 +17,7 @@ SETTINGS = [{"steps": 7}, {"steps": 3, **VARIED}, {"steps": 3, **HEIGHTS}]
 
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_follows_the_pendulum_equation(settings):
-    plan = plan_walk(GroundProfile.paper(), **settings)
+    plan = WalkPlan.over(GroundProfile.paper(), **settings)
     for stance in plan.stances:
         start = np.concatenate(stance.horizontal(stance.start)[:2])
 
@@ -32,7 +32,7 @@ def test_follows_the_pendulum_equation(settings):
 
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_switches_are_smooth_and_apexes_straight(settings):
-    plan = plan_walk(GroundProfile.paper(), **settings)
+    plan = WalkPlan.over(GroundProfile.paper(), **settings)
     for before, after in zip(plan.stances[:-1], plan.stances[1:], strict=True):
         assert before.end == after.start
         for left, right in zip(
@@ -54,14 +54,14 @@ def test_switches_are_smooth_and_apexes_straight(settings):
 
 
 def test_even_walk_keeps_its_width():
-    plan = plan_walk(GroundProfile.flat(), steps=20)
+    plan = WalkPlan.over(GroundProfile.flat(), steps=20)
     y = np.array([stance.foot[1] for stance in plan.stances])
     np.testing.assert_allclose(np.abs(np.diff(y)), 0.2, atol=1e-9)
 
 
 @pytest.mark.parametrize("steps", [2, 3])
 def test_feet_alternate_to_the_last_foothold(steps):
-    plan = plan_walk(GroundProfile.flat(), steps=steps)
+    plan = WalkPlan.over(GroundProfile.flat(), steps=steps)
     feet = [plan.previous_foot, *(one.foot for one in plan.stances), plan.next_foot]
     for stance, before, after in zip(plan.stances, feet[:-2], feet[2:], strict=True):
         for other in (before, after):
@@ -71,7 +71,7 @@ def test_feet_alternate_to_the_last_foothold(steps):
 def test_planes_of_the_com_rise_from_foothold_to_foothold():
     """On uneven stairs with uneven steps; at the end the CoM still moves along its plane."""
     ground = GroundProfile.stairs([0.1, 0.05, -0.08, 0.04], run=0.4)
-    plan = plan_walk(ground, steps=3, **VARIED)
+    plan = WalkPlan.over(ground, steps=3, **VARIED)
     feet = [plan.previous_foot, *(one.foot for one in plan.stances), plan.next_foot]
     for stance, before, after in zip(plan.stances, feet[:-2], feet[2:], strict=True):
         assert stance.slope == pytest.approx((after[2] - before[2]) / (after[0] - before[0]))
@@ -87,10 +87,10 @@ def test_the_swing_foot_passes_over_what_lies_between(height):
     ground = GroundProfile(
         x=np.array([0.0, 0.18, 0.2, 0.25, 0.27, 9.0]), z=np.array([0, 0, height, height, 0, 0])
     )
-    plan = plan_walk(ground, steps=2)
+    plan = WalkPlan.over(ground, steps=2)
     step = plan.stances[1]
     assert step.foot[0] == pytest.approx(0.45)
-    over = plan_walk(ground, steps=2, step_length=0.45).stances[1]
+    over = WalkPlan.over(ground, steps=2, step_length=0.45).stances[1]
     heights, clear = [], np.inf
     for t in np.linspace(over.start, over.end, 200):
         (x, y, z), _ = plan.swing(t, clearance=0.06)
@@ -102,8 +102,8 @@ def test_the_swing_foot_passes_over_what_lies_between(height):
 
 @pytest.fixture(scope="module")
 def walk():
-    plan = plan_walk(GroundProfile.paper(), steps=7)
-    return plan, walk_motion(HUME, plan, rate=1000.0)
+    plan = WalkPlan.over(GroundProfile.paper(), steps=7)
+    return plan, plan.motion(HUME, rate=1000.0)
 
 
 def test_feet_stand_on_the_ground_and_limits_are_kept(walk):
@@ -146,16 +146,16 @@ def test_velocities_are_the_rates_of_the_configurations(walk):
     ],
 )
 def test_other_walks_are_possible(ground, steps):
-    motion = walk_motion(HUME, plan_walk(ground, steps=steps), rate=50.0)
+    motion = WalkPlan.over(ground, steps=steps).motion(HUME, rate=50.0)
     assert np.isfinite(motion.q).all()
 
 
 def test_what_cannot_be_walked_is_named():
     with pytest.raises(InputError, match="do not meet"):
-        plan_walk(GroundProfile.flat(), steps=1, apex_speed=[0.2, 2.0], step_length=0.2)
+        WalkPlan.over(GroundProfile.flat(), steps=1, apex_speed=[0.2, 2.0], step_length=0.2)
     with pytest.raises(InputError, match="at least one step"):
-        plan_walk(GroundProfile.flat(), steps=0)
+        WalkPlan.over(GroundProfile.flat(), steps=0)
     with pytest.raises(InputError, match="increase"):
         GroundProfile(x=np.array([0.0, 0.0]), z=np.zeros(2))
     with pytest.raises(RobotError, match="stance"):
-        walk_motion(HUME, plan_walk(GroundProfile.flat(), steps=1, com_height=1.1), rate=50.0)
+        WalkPlan.over(GroundProfile.flat(), steps=1, com_height=1.1).motion(HUME, rate=50.0)

@@ -8,11 +8,11 @@ import pytest
 from sealag.design import load
 from sealag.errors import InputError, UnknownNameError
 from sealag.whole_body import (
-    SIGNAL_NAMES,
     GravityCompensation,
     Law,
     LinkAngles,
     MotorAngles,
+    Signal,
     StaticJoint,
     StiffnessForm,
     Tank,
@@ -20,7 +20,6 @@ from sealag.whole_body import (
     TaskError,
     TaskInertia,
     TaskKind,
-    signal_named,
 )
 
 HUME = load("bundled:hume")
@@ -81,9 +80,9 @@ def test_where_it_rests():
     """Only q̄(θ) with compensation has no error in the posture though the springs carry gravity."""
     rests = {
         (name, gravity): Law(
-            tasks=(posture("t"),), signal=signal_named(name), gravity=gravity
+            tasks=(posture("t"),), signal=Signal.named(name), gravity=gravity
         ).rests_at_posture
-        for name in SIGNAL_NAMES
+        for name in Signal.names()
         for gravity in GravityCompensation
     }
     assert {key for key, yes in rests.items() if yes} == {
@@ -94,10 +93,10 @@ def test_where_it_rests():
 
 def test_signals_have_the_words_of_project_files():
     kinds = [MotorAngles, LinkAngles, StaticJoint, Tank]
-    assert [type(signal_named(name)) for name in SIGNAL_NAMES] == kinds
-    assert [kind.name for kind in kinds] == list(SIGNAL_NAMES)
+    assert [type(Signal.named(name)) for name in Signal.names()] == kinds
+    assert [kind.name for kind in kinds] == list(Signal.names())
     with pytest.raises(UnknownNameError, match="static_joint_tank"):
-        signal_named("joints")
+        Signal.named("joints")
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from helpers.small_systems import arm, arm_system, joint_task
 from sealag.design import load
 from sealag.robot import Contact
 from sealag.simulation import Outcome
-from sealag.whole_body import SIGNAL_NAMES, GravityCompensation, Law, signal_named
+from sealag.whole_body import GravityCompensation, Law, Signal
 
 HUME = load("bundled:hume")
 GAIN = 30.0
@@ -20,7 +20,7 @@ def system_of(folder, signal, gravity, **changes):
     robot = arm(folder)
     law = Law(
         tasks=(joint_task(robot, GAIN),),
-        signal=signal_named(signal),
+        signal=Signal.named(signal),
         gravity=gravity,
         stiffness_form="force",
     )
@@ -59,7 +59,7 @@ def by_hand(system, signal, gravity):
 
 
 @pytest.mark.parametrize("gravity", list(GravityCompensation))
-@pytest.mark.parametrize("signal", SIGNAL_NAMES)
+@pytest.mark.parametrize("signal", Signal.names())
 def test_rest_is_the_equilibrium_written_out(tmp_path, signal, gravity):
     system = system_of(tmp_path, signal, gravity)
     rest = system.rest()
@@ -83,7 +83,7 @@ def test_rest_is_the_equilibrium_written_out(tmp_path, signal, gravity):
 
 
 @pytest.mark.parametrize("gravity", list(GravityCompensation))
-@pytest.mark.parametrize("signal", SIGNAL_NAMES)
+@pytest.mark.parametrize("signal", Signal.names())
 def test_in_the_posture_the_tasks_have_no_error_and_springs_carry_gravity(
     tmp_path, signal, gravity
 ):

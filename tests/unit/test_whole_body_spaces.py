@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from helpers.designs import EXAMPLES
-from sealag.actuation import actuators
-from sealag.design import certified_bounds, load
+from sealag.actuation import Actuators
+from sealag.design import load
 from sealag.robot import Contact, ContactKind, Motion
 from sealag.whole_body import (
     GravityCompensation,
@@ -17,7 +17,6 @@ from sealag.whole_body import (
     StiffnessForm,
     Task,
     TaskKind,
-    relative_asymmetry,
 )
 
 HUME = load("bundled:hume")
@@ -95,9 +94,9 @@ def test_gravity_gradient_is_symmetric_where_joints_move_everything(system):
     if system is BAXTER:
         expected = system.robot.gravity_gradient(near(system, 3))
         np.testing.assert_allclose(spaces.F_gravity[0], expected, atol=1e-7)
-        assert relative_asymmetry(spaces.F_gravity)[0] < 1e-9
+        assert Spaces.relative_asymmetry(spaces.F_gravity)[0] < 1e-9
     else:
-        assert relative_asymmetry(spaces.F_gravity)[0] > 1e-6, "two feet leave a free motion"
+        assert Spaces.relative_asymmetry(spaces.F_gravity)[0] > 1e-6, "two feet leave a free motion"
 
 
 def test_gravity_gradient_on_four_feet_is_symmetric_on_the_motions_left():
@@ -108,8 +107,8 @@ def test_gravity_gradient_on_four_feet_is_symmetric_on_the_motions_left():
     free = np.linalg.svd(J_s)[2][12:].T[6:]
     basis = np.linalg.qr(free)[0]
     assert basis.shape == (12, 6)
-    assert relative_asymmetry(basis.T @ spaces.F_gravity[0] @ basis) < 1e-7
-    assert relative_asymmetry(spaces.F_gravity[0]) > 1e-3
+    assert Spaces.relative_asymmetry(basis.T @ spaces.F_gravity[0] @ basis) < 1e-7
+    assert Spaces.relative_asymmetry(spaces.F_gravity[0]) > 1e-3
 
 
 def test_static_feedback_is_stiffer_by_the_springs():
@@ -151,7 +150,7 @@ def test_contraction_and_asymmetry_are_those_of_what_is_fed_back():
 
 def test_static_feedback_without_contraction_has_no_bound():
     """And where the law is exactly as stiff as its springs, no stiffness either."""
-    soft = actuators(
+    soft = Actuators.of(
         BAXTER.robot.joints, spring_stiffness=5.0, rotor_inertia=0.1, motor_damping=1.0
     )
     law = replace(BAXTER.law, signal=StaticJoint(), gravity=GravityCompensation.NONE)
@@ -159,7 +158,7 @@ def test_static_feedback_without_contraction_has_no_bound():
         system = replace(BAXTER, actuators=springs, law=law)
         spaces = system.spaces()
         assert (spaces.contraction[0] > 1.0) == refused
-        assert (certified_bounds(spaces, system).delay[0] == 0.0) == refused
+        assert (system.certified_bounds(spaces).delay[0] == 0.0) == refused
         assert (law.signal.refusal(spaces.contraction) is not None) == refused
     F = spaces_of(BAXTER).F_q
     least = np.linalg.eigvalsh(F[0])[-1]

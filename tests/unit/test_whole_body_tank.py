@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from helpers.chains import planar_arm, wheel
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.whole_body import (
     Controller,
     GravityCompensation,
@@ -31,7 +31,7 @@ class Posed:
 
     def __init__(self, folder, S, *, delay_bound=0.05, start=None, **options):
         arm = planar_arm(folder, count=3, mass=1.0, inertia=0.05, length=0.4)
-        drives = actuators(arm.joints, spring_stiffness=K, rotor_inertia=0.1, motor_damping=10.0)
+        drives = Actuators.of(arm.joints, spring_stiffness=K, rotor_inertia=0.1, motor_damping=10.0)
         task = Task(name="posture", kind=TaskKind.POSTURE, stiffness=S)
         law = Law(
             tasks=(task,),
@@ -158,7 +158,7 @@ def simulate_one_joint(folder, flow, *, up=0.0, rate=20.0, duration=1.5, spring_
     x̂, u and E of a tick belong to the instant of measurement, so V takes them from `up` later.
     """
     robot = wheel(folder, inertia=M)
-    motors = actuators(robot.joints, spring_stiffness=K, rotor_inertia=B_S, motor_damping=D)
+    motors = Actuators.of(robot.joints, spring_stiffness=K, rotor_inertia=B_S, motor_damping=D)
     task = Task(name="wheel", kind=TaskKind.POSTURE, stiffness=K_Q)
     d = 0.999 * BOUND
     law = Law(
@@ -226,7 +226,7 @@ def test_total_never_rises_with_either_flow_where_u_is_zero(tmp_path):
 
 def arm_controller(folder, *, reference=None, rate, **options):
     arm = planar_arm(folder, count=2, mass=1.0, inertia=0.05, length=0.4)
-    motors = actuators(arm.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
+    motors = Actuators.of(arm.joints, spring_stiffness=350.0, rotor_inertia=0.1, motor_damping=10.0)
     task = Task(name="posture", kind=TaskKind.POSTURE, stiffness=50.0)
     law = Law(
         tasks=(task,),

@@ -1,12 +1,5 @@
 """Series elastic actuators with their embedded controller, and how transparent they are."""
 
-from sealag.actuation._actuators import Actuators, actuators, actuators_of, motors_of
-from sealag.actuation._transparency import transparency
+from sealag.actuation._actuators import Actuators
 
-__all__ = [
-    "Actuators",
-    "actuators",
-    "actuators_of",
-    "motors_of",
-    "transparency",
-]
+__all__ = ["Actuators"]

@@ -13,7 +13,7 @@ from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import Draft, check_output, opened, write_text
-from sealag.passivity import Answer, Certificate, Criterion, Status, write_certificate
+from sealag.passivity import Answer, Certificate, Criterion, Status
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
 
@@ -107,18 +107,18 @@ def certify_project(
     if criterion is not None and criterion not in set(Criterion):
         raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
     count = None if proofs == "all" else _count(proofs)
-    path = out or Path(f"{design.resolve_project(project).stem}.certificate.json")
     system = design.load(project)
+    path = out or Path(f"{system.name}.certificate.json")
     check_output(path, *system.files, *([motion] if motion else []))
     along = _motion(system, motion)
-    design.check_question(system, along, criterion, time_varying=time_varying, proofs=count)
+    system.criterion_asked(along, criterion, time_varying=time_varying, proofs=count)
     with Draft(path) as draft:
         compile_kernels()
         with _busy("certifying", along):
             certificate = design.certify(
                 system, along, criterion=criterion, time_varying=time_varying, proofs=count
             )
-        write_certificate(certificate, draft)
+        certificate.write(draft)
     if as_json:
         show_json(certificate.summary())
     else:
@@ -197,7 +197,7 @@ def margin_project(
     along = _motion(system, motion)
     compile_kernels()
     with _busy("computing margins", along):
-        found = design.local_margins(system, along, horizon=horizon)
+        found = system.local_margins(along, horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
         show_json(answer)
@@ -221,7 +221,7 @@ def _sweep_rates(project: str, *, as_json: bool) -> None:
     system = design.load(project)
     compile_kernels()
     with _busy("lifting sampled loops"):
-        rates = design.rate_sweep(system)
+        rates = system.rate_sweep()
     if as_json:
         show_json({"rates": [rate.summary() for rate in rates]})
         return
@@ -249,8 +249,6 @@ def verify_certificate(
     as_json: bool,
 ) -> int:
     """Check a certificate, against its project if one is given; 1 if it does not hold."""
-    from sealag.passivity import read_certificate, verify
-
     if second:
         if exact or project is not None or motion is not None:
             raise InputError(
@@ -260,9 +258,9 @@ def verify_certificate(
     if project is None:
         if motion is not None:
             raise InputError("--motion needs --project.")
-        result = verify(path, exact=exact)
+        result = Certificate.verify(path, exact=exact)
     else:
-        read_certificate(path)
+        Certificate.read(path)
         system = design.load(project)
         along = _motion(system, motion)
         compile_kernels()

@@ -20,8 +20,8 @@ def export_project(
     """Write the model and show its delays."""
     if target != TARGET:
         raise InputError(f"--for is {target!r}; it must be {TARGET}.")
-    path = out or Path(f"{design.resolve_project(project).stem}.xml")
     system = design.load(project)
+    path = out or Path(f"{system.name}.xml")
     check_output(path, *system.files)
     with Draft(path) as draft:
         compile_kernels()

@@ -14,7 +14,7 @@ from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import InputError
 from sealag.files import Draft, check_output
-from sealag.report import run_summary, write_run
+from sealag.report import write_run
 from sealag.simulation import MeasuredGait, Outcome, Run
 from sealag.units import seconds_from_ms
 from sealag.version import __version__
@@ -37,10 +37,10 @@ def simulate_project(
     as_json: bool,
 ) -> None:
     """Run a scenario with a progress bar, write the recording and show the audit."""
-    path = out or Path(f"{design.resolve_project(project).stem}.mcap")
     system = design.load(project)
+    path = out or Path(f"{system.name}.mcap")
     check_output(path, *system.files)
-    length = design.scenario_duration(system, scenario) if duration is None else duration
+    length = system.duration(scenario) if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"--duration is {length}; a positive time in s is needed.")
     try:
@@ -68,7 +68,7 @@ def simulate_project(
             ),
         )
         saved = _record(run, system, draft)
-    answer = run_summary(run, recording=saved)
+    answer = run.summary(recording=saved)
     kind = system.simulation.scenario if scenario is None else scenario
     if kind == "walk":
         answer |= gait_summary(system, run)

@@ -2,11 +2,10 @@
 
 from sealag.delay._delays import Delays, RoundTrip
 from sealag.delay._link import Link, PacketOrder
-from sealag.delay._signal import Constant, DelaySignal, Sinusoid, Table
+from sealag.delay._signal import Constant, Sinusoid, Table
 
 __all__ = [
     "Constant",
-    "DelaySignal",
     "Delays",
     "Link",
     "PacketOrder",

@@ -3,13 +3,18 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sealag.design._system import System
+from sealag.design._local import Local, local_of
 from sealag.robot import Motion
 from sealag.store import blocks, release
-from sealag.whole_body import Spaces
+from sealag.typing import Array
+from sealag.whole_body import Rest, Spaces
+
+if TYPE_CHECKING:
+    from sealag.design._system import System
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +26,7 @@ class Along:
         motion: its instants.
     """
 
-    system: System
+    system: "System"
     motion: Motion
 
     @cached_property
@@ -52,3 +57,12 @@ class Along:
         if not len(chosen) or chosen[-1] < len(self._first):
             return self._first.at(instants)
         return self.system.spaces(self.motion.at(chosen.tolist())).at(order.tolist())
+
+    def local(self, bounds: Array, rest: Rest | None = None) -> Local:
+        """Decide stability and margin of the law that runs at every instant.
+
+        Args:
+            bounds: (N,) of the certified criterion, s; 0 where it decides nothing.
+            rest: where the loop of the first instant rests, if that is known already.
+        """
+        return local_of(self, bounds, rest)

@@ -183,7 +183,7 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
     if left_out:
         yield (
             "urdf_left_out",
-            f"The URDF's {', '.join(left_out)} is not used; actuators_of uses it.",
+            f"The URDF's {', '.join(left_out)} is not used; Actuators.of_robot uses it.",
         )
     if (robot.effort_limit == 0.0).any() or (robot.velocity_limit == 0.0).any():
         zero = (robot.effort_limit == 0.0) | (robot.velocity_limit == 0.0)

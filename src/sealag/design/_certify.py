@@ -7,19 +7,16 @@ from importlib.metadata import version
 import numpy as np
 from threadpoolctl import threadpool_info
 
-from sealag.design._along import Along
 from sealag.design._assumptions import assumptions_of
 from sealag.design._criteria import (
     bounds_along,
     common_bound,
     delayed_stiffness,
     prove_instants,
-    stated_windows,
     time_varying_bound,
 )
-from sealag.design._local import Local, local_of
-from sealag.design._system import System
-from sealag.errors import InputError, either
+from sealag.design._local import Local
+from sealag.design._system import PROOF_COUNT, System
 from sealag.passivity import (
     Answer,
     Bound,
@@ -39,12 +36,6 @@ from sealag.typing import Array
 from sealag.units import time_text
 from sealag.version import __version__
 from sealag.whole_body import Rest as Equilibrium
-
-MOST_INSTANTS = 1_400_000
-"""Instants of one certificate: its file has at most 100 MB, and up to 70 bytes an instant."""
-
-PROOF_COUNT = 12
-"""Instants whose numbers a certificate holds if nothing else is asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,10 +138,10 @@ def certify(
         RobotError: a mass matrix is not positive definite.
         UnknownNameError: a frame or joint does not exist.
     """
-    kind = check_question(system, motion, criterion, time_varying=time_varying, proofs=proofs)
-    motion = system.still() if motion is None else motion
+    kind = system.criterion_asked(motion, criterion, time_varying=time_varying, proofs=proofs)
+    along = system.along(motion)
+    motion = along.motion
     rest = system.rest(motion) if len(motion) == 1 else None
-    along = Along(system=system, motion=motion)
     bounds = bounds_along(along, kind, rest=rest, published=True, solver=solver)
     printed = kind is Criterion.PUBLISHED
     bound, common, moving = bounds.bound, None, None
@@ -167,7 +158,7 @@ def certify(
     )
     withdrawn = proven is not bound
     decided = np.zeros(len(motion)) if printed else bound.delay
-    local = local_of(along, decided, rest)
+    local = along.local(decided, rest)
     if (
         rest is not None and rest.found and local.loop is None
     ):  # a law that cannot run rests nowhere
@@ -189,46 +180,6 @@ def certify(
         rest=rest,
     )
     return Certificate(question=_question(case), answer=_answer(case), evidence=_evidence(case))
-
-
-def check_question(
-    system: System,
-    motion: Motion | None,
-    criterion: Criterion | str | None,
-    *,
-    time_varying: bool = False,
-    proofs: int | None = PROOF_COUNT,
-) -> Criterion:
-    """Return the criterion that `certify` would use, if what it is asked has an answer.
-
-    Args:
-        system: the design.
-        motion: the motion, or None.
-        criterion: what is asked for, or None.
-        time_varying: whether a bound for matrices that move is asked for.
-        proofs: how many instants with their numbers; None for all.
-
-    Raises:
-        InputError: as `certify` raises it.
-    """
-    if not isinstance(motion, Motion | None):
-        raise InputError(f"motion is {motion!r}; load_motion makes a Motion of a file.")
-    if motion is not None and len(motion) > MOST_INSTANTS:
-        raise InputError(
-            f"The motion has {len(motion)} instants; a certificate holds {MOST_INSTANTS} at most. "
-            "Certify parts of the motion, or fewer of its rows."
-        )
-    if proofs is not None and not (isinstance(proofs, int) and proofs >= 1):
-        raise InputError(f"proofs is {proofs!r}; it must be a whole number from 1 up, or None.")
-    name = system.criterion if criterion is None else criterion
-    if name not in set(Criterion):
-        raise InputError(f"criterion is {name!r}; it must be {either(list(Criterion))}.")
-    if time_varying and (name == Criterion.PUBLISHED or motion is None or len(motion) < 2):
-        raise InputError(
-            "A time-varying bound needs the certified criterion and a motion of more than one "
-            "instant (--motion)."
-        )
-    return Criterion(name)
 
 
 def _question(case: _Case) -> Question:
@@ -309,7 +260,7 @@ def _evidence(case: _Case) -> Evidence:
     W_moving = _stated_multiplier(moving)
     windows = ()
     if moving is not None and W_moving is not None:
-        windows = stated_windows(moving, case.system.actuators.motor_damping)
+        windows = moving.stated_windows(case.system.actuators.motor_damping)
     return Evidence(
         time_s=case.motion.time,
         bounds_s=tuple(case.bound.delay.tolist()),

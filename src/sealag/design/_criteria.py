@@ -3,19 +3,22 @@ the published one ((29), (31))."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sealag import passivity
-from sealag.design._along import Along
-from sealag.design._system import System
 from sealag.errors import SolverError
-from sealag.passivity import Bound, Criterion, InstantProof, Joined, Problem, Solver, Window, solve
+from sealag.passivity import Bound, Criterion, InstantProof, Problem, Solver, solve
 from sealag.robot import Motion
 from sealag.store import Store, release
 from sealag.typing import Array, BoolArray
 from sealag.units import time_text
-from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError, relative_asymmetry
+from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError
+
+if TYPE_CHECKING:
+    from sealag.design._along import Along
+    from sealag.design._system import System
 
 ASYMMETRY_TOLERANCE = 1e-7
 """Relative asymmetry up to which a stiffness counts as symmetric: rounding, and the error of the
@@ -35,23 +38,15 @@ rank."""
 
 
 def certified_bounds(
-    spaces: Spaces, system: System, rest: Rest | None = None, motion: Motion | None = None
+    spaces: Spaces, system: "System", rest: Rest | None, motion: Motion | None
 ) -> Bound:
-    """Bound every instant by the criterion of docs/theory section 6 for the law that is run.
-
-    Sufficient for a passive controller side along the frozen motion: the signal is one that a
-    potential can belong to, the drives are ideal, the motors carry the static load, no contact or
-    task is singular, the whole delayed stiffness F_θ is symmetric, the task stiffness positive
-    semidefinite, and d_1 ≤ 1 / w(D^-½ F_θ D^-½).
+    """Bound every instant as `System.certified_bounds` says.
 
     Args:
         spaces: the law's matrices.
         system: the design.
         rest: where the loop rests in its posture; None for a motion.
         motion: whose speeds the motors must reach; None for a posture.
-
-    Returns:
-        The bound of each instant, 0 where a condition fails.
     """
     conditions = Conditions.room(system, len(spaces))
     conditions.put(slice(None), spaces)
@@ -76,7 +71,7 @@ class BoundsAlong:
 
 
 def bounds_along(
-    along: Along,
+    along: "Along",
     kind: Criterion,
     *,
     rest: Rest | None = None,
@@ -93,7 +88,7 @@ def bounds_along(
         solver: where multipliers of several levels come from; Clarabel's own interface if None.
     """
     system, count, printed = along.system, len(along.motion), kind is Criterion.PUBLISHED
-    conditions, whole = Conditions.room(system, count), Joined(count)
+    conditions, whole = Conditions.room(system, count), Bound.by_parts(count)
     published = published or printed
     least, asymmetry = np.inf if published else np.nan, 0.0
     for rows, spaces in along.parts():
@@ -105,7 +100,7 @@ def bounds_along(
         whole.add(rows, part)
         conditions.put(rows, spaces)
         F = delayed_stiffness(spaces, system, kind) if printed else None
-        bent = spaces.asymmetry if F is None else relative_asymmetry(F)
+        bent = spaces.asymmetry if F is None else Spaces.relative_asymmetry(F)
         asymmetry = np.maximum(asymmetry, bent.max())
     bound = whole.bound if printed else conditions.refuse(whole.bound, rest, along.motion)
     return BoundsAlong(
@@ -116,7 +111,7 @@ def bounds_along(
     )
 
 
-def _unconditional(spaces: Spaces, system: System) -> Bound:
+def _unconditional(spaces: Spaces, system: "System") -> Bound:
     """The bound of each instant if no condition failed."""
     F = delayed_stiffness(spaces, system, Criterion.CERTIFIED)
     problem = Problem.of_stiffness(F, system.actuators.motor_damping)
@@ -136,7 +131,7 @@ class Conditions:
         load: (N, n) torque that gravity needs, Nm.
     """
 
-    system: System
+    system: "System"
     contraction: Array
     asymmetry: Array
     singular: BoolArray
@@ -144,7 +139,7 @@ class Conditions:
     load: Array
 
     @classmethod
-    def room(cls, system: System, count: int) -> "Conditions":
+    def room(cls, system: "System", count: int) -> "Conditions":
         """Return room for what is measured at some instants, to be filled by `put`.
 
         Args:
@@ -245,7 +240,7 @@ class Conditions:
         )
 
 
-def _drive_refusals(system: System) -> Iterator[str]:
+def _drive_refusals(system: "System") -> Iterator[str]:
     """Why drives that are late are covered by no passive bound (docs/theory section 14)."""
     slow = np.flatnonzero(np.isfinite(system.actuators.torque_bandwidth))
     if len(slow):
@@ -263,7 +258,7 @@ def _drive_refusals(system: System) -> Iterator[str]:
         )
 
 
-def _asymmetry_source(system: System) -> str:
+def _asymmetry_source(system: "System") -> str:
     """What makes a stiffness asymmetric."""
     if system.law.stiffness_form is StiffnessForm.PUBLISHED:
         return "the stiffness Λ K_x"
@@ -277,7 +272,7 @@ def _semidefinite(F: Array) -> Array:
     return values[:, 0] >= -1e-9 * np.maximum(np.abs(values).max(axis=1), 1e-300)
 
 
-def task_stiffness(spaces: Spaces, system: System, kind: Criterion) -> Array:
+def task_stiffness(spaces: Spaces, system: "System", kind: Criterion) -> Array:
     """Return the task stiffness S that a criterion uses, (N, m, m).
 
     Args:
@@ -292,7 +287,7 @@ def task_stiffness(spaces: Spaces, system: System, kind: Criterion) -> Array:
     return spaces.Lambda @ spaces.K_x
 
 
-def delayed_stiffness(spaces: Spaces, system: System, kind: Criterion) -> Array:
+def delayed_stiffness(spaces: Spaces, system: "System", kind: Criterion) -> Array:
     """Return the motor-side stiffness F that a criterion uses, (N, n, n), Nm/rad.
 
     Args:
@@ -306,7 +301,7 @@ def delayed_stiffness(spaces: Spaces, system: System, kind: Criterion) -> Array:
     return np.swapaxes(spaces.J_star, -1, -2) @ S @ spaces.J_star
 
 
-def published_bounds(spaces: Spaces, system: System, *, solver: Solver | None = None) -> Bound:
+def published_bounds(spaces: Spaces, system: "System", *, solver: Solver | None = None) -> Bound:
     """Bound every instant by (29), or by (31) for several priority levels, as printed.
 
     Args:
@@ -353,32 +348,8 @@ def time_varying_bound(bound: Bound, motion: Motion, *, solver: Solver | None = 
     return solve(bound.problem, share=share, solver=solver).eased(PROOF_SHARE)
 
 
-def stated_windows(bound: Bound, D_theta: Array) -> tuple[Window, ...]:
-    """Return the polytopes of a time-varying bound in Nm/rad.
-
-    Args:
-        bound: from `time_varying_bound`.
-        D_theta: (n,) motor damping, Nms/rad.
-    """
-    root = np.sqrt(D_theta)[:, None]
-    found = []
-    for one in bound.windows:
-        centre, *axes = root * one.M
-        kept = [axis for axis in axes if axis.any()]
-        found.append(
-            Window(
-                first=one.first,
-                last=one.last,
-                centre=centre,
-                axes=np.array(kept).reshape(-1, *centre.shape),
-                radius=one.radius,
-            )
-        )
-    return tuple(found)
-
-
 def prove_instants(
-    along: Along,
+    along: "Along",
     bound: Bound,
     *,
     kind: Criterion,

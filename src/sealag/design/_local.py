@@ -1,17 +1,21 @@
 """Stability and delay margin of the law that runs, decided over all instants of a motion."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sealag.design._along import Along
 from sealag.design._criteria import ASYMMETRY_TOLERANCE
 from sealag.errors import ContractionError, SolverError
-from sealag.margin import DelayMargin, delay_margin, rightmost_roots
+from sealag.margin import DelayMargin
 from sealag.passivity import Basis, LocalLoop, Place
+from sealag.robot import Contact
 from sealag.typing import Array, BoolArray, IntArray
-from sealag.whole_body import FreeLinks, FrozenLoop, LinkPlant, Rest, sea_loop
+from sealag.whole_body import FrozenLoop, Rest
+
+if TYPE_CHECKING:
+    from sealag.design._along import Along
 
 MOST_EXACT = 600
 """Instants of a motion that are decided exactly at most; a bound decides the others, or none."""
@@ -21,9 +25,6 @@ _AT_REST = 1e-7
 """Share of weight and torques that may be unbalanced in a posture that counts as at rest. Ten times
 less loses postures of stiff contacts; ten times more takes sagging ones for equilibria."""
 
-_DRIFT = 1e-9
-"""1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
-
 _BESIDE = 1e-3
 """rad: distance over which a law is differentiated once more in a singular posture. Over 3e-5 rad
 it does without the direction that it lost; a robot moves further than that."""
@@ -31,8 +32,6 @@ it does without the direction that it lost; a robot moves further than that."""
 _BEND = 1e-4
 """Share of a law's derivative that may change over `_BESIDE`: smooth laws stay 1e-6 apart, bent
 ones 1e-2."""
-
-_MOST_DRIFTING = 8  # zero roots that are counted
 
 _MINIMUM = 1e-9
 """Share of the largest curvature above which a potential has a strict minimum. Ten times less is
@@ -126,7 +125,7 @@ class Local:
         return int((self.basis == basis).sum())
 
 
-def local_of(along: Along, bounds: Array, rest: Rest | None = None) -> Local:
+def local_of(along: "Along", bounds: Array, rest: Rest | None = None) -> Local:
     """Decide stability and margin of the law that runs at every instant of a motion.
 
     Each instant is a loop that holds the instant's configuration. It is frozen in that
@@ -174,15 +173,12 @@ class _Known:
 class _Decision:
     """The decision over a motion, instant by instant."""
 
-    def __init__(self, along: Along, bounds: Array, first: Rest | None) -> None:
+    def __init__(self, along: "Along", bounds: Array, first: Rest | None) -> None:
         self._along, self._bounds, self._first = along, bounds, first
         self._system, self._motion = along.system, along.motion
         count = len(self._motion)
         self._basis = np.full(count, Basis.OPEN, dtype=object)
         self._delay, self._roots = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
-        self._plants = [
-            LinkPlant(self._system.robot, contacts) for contacts in self._motion.contact_sets
-        ]
         self._best: _Known | None = None
         self._critical = 0
 
@@ -218,8 +214,9 @@ class _Decision:
     def _search(self, k: int) -> None:
         """Search a loop at a minimum for crossings below the smallest margin so far."""
         least, robot, spaces = self._least(), self._system.robot, self._along.at([k])
-        links = self._links(k, spaces.gravity[0])
-        loop = sea_loop(
+        q, contacts = self._held(k)
+        links = FrozenLoop.free_links(robot, q, spaces.gravity[0], contacts=contacts)
+        loop = FrozenLoop.of_links(
             self._system.actuators,
             M=links.M,
             H=links.H,
@@ -229,7 +226,7 @@ class _Decision:
             joint_damping=robot.damping,
         )
         try:
-            margin = margin_of(loop, at_most=None if np.isinf(least) else least)
+            margin = DelayMargin.of_loop(loop, at_most=None if np.isinf(least) else least)
         except SolverError:
             self._found(k, Basis.OPEN, np.nan)
             return
@@ -281,7 +278,7 @@ class _Decision:
                     "another posture"
                 )
             else:
-                margin = margin_of(loop)
+                margin = DelayMargin.of_loop(loop)
         except (ContractionError, SolverError) as error:
             problem = problem or str(error)
         return _Known(margin=margin, loop=loop, at=at, rest=state, problem=problem)
@@ -299,17 +296,18 @@ class _Decision:
                 found[k] = self._is_minimum(k, spaces.gravity[i], spaces.F_theta[i])
         return found
 
-    def _links(self, k: int, springs: Array) -> FreeLinks:
-        """The links under springs (n,), Nm, at an instant."""
-        plant = self._plants[self._motion.contact_index[k]]
-        return plant.free(self._motion.q[k], springs)
+    def _held(self, k: int) -> tuple[Array, tuple[Contact, ...]]:
+        """Configuration and contacts of an instant."""
+        motion = self._motion
+        return motion.q[k], motion.contact_sets[motion.contact_index[k]]
 
     def _is_minimum(self, k: int, springs: Array, F: Array) -> bool:
         """Whether the loop rests at the instant, in a strict minimum of the whole potential, and
         joints determine all motions, so that the command is −F_θ δθ alone."""
-        system, links = self._system, self._links(k, springs)
+        system, (q, contacts) = self._system, self._held(k)
+        links = FrozenLoop.free_links(system.robot, q, springs, contacts=contacts)
         S, K = links.Z[system.robot.nv_base :], np.diag(system.actuators.spring_stiffness)
-        force = system.robot.gravity(self._motion.q[k])
+        force = system.robot.gravity(q)
         force[system.robot.nv_base :] -= springs
         weight = max(system.robot.weight, float(np.abs(springs).max(initial=0.0)))
         if np.abs(links.Z.T @ force).max(initial=0.0) > _AT_REST * weight:
@@ -319,41 +317,6 @@ class _Decision:
         hessian = np.block([[links.H + S.T @ K @ S, -S.T @ K], [-K @ S, K + (F + F.T) / 2.0]])
         values = np.linalg.eigvalsh(hessian)
         return bool(values[0] > _MINIMUM * values[-1])
-
-
-def margin_of(loop: FrozenLoop, **choices: object) -> DelayMargin:
-    """Return the exact margin of a frozen loop; see `sealag.margin.delay_margin`.
-
-    Where compensation cancels gravity, what is left of a zero root is the rounding of the loop's
-    entries: a root without delay that is no further than that from the axis is not stable.
-
-    Args:
-        loop: the loop.
-        choices: further arguments of `delay_margin`.
-    """
-    found = delay_margin(
-        loop.A_0,
-        loop.A_1,
-        A_e=loop.A_e,
-        embedded_delay=loop.embedded_delay,
-        symmetries=loop.symmetries,
-        **choices,  # pyright: ignore[reportArgumentType]
-    )
-    if found.unstable_roots or not len(loop.A_0):
-        return found
-    rightmost = rightmost_roots(
-        loop.A_0,
-        loop.A_1,
-        0.0,
-        A_e=loop.A_e,
-        embedded_delay=loop.embedded_delay,
-        count=_MOST_DRIFTING,
-        symmetries=loop.symmetries,
-    )
-    drifting = int((rightmost.real > -_DRIFT).sum())
-    if not drifting:
-        return found
-    return replace(found, delay=0.0, unstable_roots=drifting, guaranteed=False)
 
 
 def _spread(instants: Array, most: int) -> Array:

@@ -3,19 +3,19 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sealag.design._along import Along
 from sealag.design._criteria import bounds_along
 from sealag.design._jitter import jitter_along
-from sealag.design._local import local_of, margin_of
-from sealag.design._system import System
 from sealag.errors import ContractionError, InputError, SolverError
-from sealag.margin import Interval
+from sealag.margin import DelayMargin
 from sealag.passivity import Basis, Criterion
 from sealag.robot import Motion
+
+if TYPE_CHECKING:
+    from sealag.design._system import System
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,8 +39,8 @@ class LocalMargins:
         instants: number of instants of the motion.
         exact: number of them that were decided exactly.
         bounded: number of them whose margin lies above their passive bound, decided by it.
-        intervals: ranges of delay at that instant with their numbers of unstable roots, when a
-            horizon was given; else empty.
+        intervals: ranges of delay at that instant, shortest and longest, s, with their numbers of
+            unstable roots, when a horizon was given; else empty.
     """
 
     delay_s: float | None
@@ -56,19 +56,15 @@ class LocalMargins:
     instants: int
     exact: int
     bounded: int
-    intervals: tuple[Interval, ...]
+    intervals: tuple[tuple[float, float, int], ...]
 
     def summary(self) -> dict[str, Any]:
         """Return everything as JSON says it: "unbounded" for a time that no delay reaches, None for
         what is not known."""
         plain = {key: _stated(value) for key, value in asdict(self).items()}
         plain["intervals"] = [
-            {
-                "from_s": part.lower,
-                "to_s": _stated(part.upper),
-                "unstable_roots": part.unstable_roots,
-            }
-            for part in self.intervals
+            {"from_s": shortest, "to_s": _stated(longest), "unstable_roots": count}
+            for shortest, longest, count in self.intervals
         ]
         return plain
 
@@ -77,40 +73,27 @@ def _stated(value: Any) -> Any:
     return "unbounded" if isinstance(value, float) and math.isinf(value) else value
 
 
-def local_margins(
-    system: System, motion: Motion | None = None, *, horizon: float | None = None
-) -> LocalMargins:
-    """Decide the exact local margin of the law that runs, and its jitter margin, over all instants.
-
-    The margin is necessary and sufficient for local stability at constant delay with frozen
-    coefficients, the jitter margin sufficient for delays that vary; both at the equilibrium of the
-    loop that holds an instant. The delay is d_1, the sum of all ways around the loop; delayed
-    torque feedback in the drives has a delay of its own. Instants that a potential decides are
-    computed only where their passive bound lies below the smallest margin.
+def local_margins(system: "System", motion: Motion | None, horizon: float | None) -> LocalMargins:
+    """Decide what `System.local_margins` returns.
 
     Args:
         system: the design.
         motion: the motion; the system's posture if None.
-        horizon: longest delay up to which the ranges of stable and unstable delay are listed, s.
-
-    Raises:
-        InputError: the horizon is not a positive time.
-        ContractionError: q̄(θ) is fed back and does not exist.
-        SolverError: the margin at the instant that sets it could not be decided.
+        horizon: longest delay of the ranges that are listed, s; None for none.
     """
     if horizon is not None and not (math.isfinite(horizon) and horizon > 0.0):
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
-    motion = system.still() if motion is None else motion
-    along = Along(system=system, motion=motion)
+    along = system.along(motion)
+    motion = along.motion
     bounds = bounds_along(along, Criterion.CERTIFIED).bound.delay
-    local = local_of(along, bounds)
+    local = along.local(bounds)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
         raise ContractionError(local.problem)
     if margin is None:
         raise SolverError(local.problem)
     if horizon is not None:
-        margin = margin_of(loop, horizon=horizon)
+        margin = DelayMargin.of_loop(loop, horizon=horizon)
     motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
     size = np.abs(margin.mode[motors]) if len(margin.mode) else np.zeros(len(motors))
     shares = size / max(float(size.sum()), 1e-300)

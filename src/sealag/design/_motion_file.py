@@ -13,7 +13,7 @@ import numpy as np
 
 from sealag.errors import InputError, MotionError
 from sealag.files import opened, written_whole
-from sealag.robot import UNIT_TOLERANCE, Contact, Motion, Robot, require_within_limits
+from sealag.robot import Contact, Motion, Robot
 from sealag.store import Store, blocks, release
 from sealag.typing import Array
 from sealag.units import number_of
@@ -73,7 +73,7 @@ def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] =
         q[:, 3:7] = _unit(q[:, 3:7], path)
         release(q)
     try:
-        require_within_limits(robot, q)
+        robot.require_within_limits(q)
     except InputError as error:
         raise MotionError(f"{path}: {error}") from error
     sets, index = _contact_sets(table, contacts)
@@ -114,7 +114,7 @@ def _check_rows(table: dict[str, Array], path: Path) -> None:
 
 def _unit(quaternions: Array, path: Path) -> Array:
     norm = np.linalg.norm(quaternions, axis=1)
-    bad = np.abs(norm - 1.0) > UNIT_TOLERANCE
+    bad = np.abs(norm - 1.0) > Robot.UNIT_TOLERANCE
     if bad.any():
         row = int(bad.argmax())
         raise MotionError(

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from sealag.actuation import Actuators, actuators_of
+from sealag.actuation import Actuators
 from sealag.delay import (
     Constant,
     Delays,
-    DelaySignal,
     Link,
     PacketOrder,
     RoundTrip,
@@ -27,38 +26,15 @@ from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError
 from sealag.files import bundled, read_whole
 from sealag.passivity import Criterion
-from sealag.robot import (
-    UNIT_TOLERANCE,
-    Contact,
-    ContactKind,
-    Robot,
-    load_robot,
-    require_within_limits,
-    resolve_urdf,
-)
+from sealag.robot import Contact, ContactKind, Robot, load_robot
 from sealag.typing import Array
 from sealag.units import number_of
-from sealag.whole_body import Law, Signal, Tank, TankFlow, Task, TaskKind, signal_named
+from sealag.whole_body import Law, Signal, Tank, TankFlow, Task, TaskKind
 
 LARGEST_PROJECT_BYTES = 1_000_000
 LARGEST_SAMPLES_BYTES = 50_000_000
 _TOO_LARGE = "has too many digits; TOML's whole numbers have at most 19"
 _REQUIRED = ("spring_stiffness", "rotor_inertia", "motor_damping", "inertia_shaping")
-
-
-def resolve_project(text: str | Path) -> Path:
-    """Return the path of a project file, which may be a bundled one.
-
-    Args:
-        text: a path, or `bundled:hume`.
-
-    Raises:
-        UnknownNameError: no bundled project has this name.
-    """
-    if not str(text).startswith("bundled:"):
-        return Path(text)
-    name = str(text).removeprefix("bundled:").removesuffix(".toml")
-    return bundled(name, ending=".toml", what="project")
 
 
 def load(path: str | Path) -> System:
@@ -71,29 +47,28 @@ def load(path: str | Path) -> System:
         The system.
 
     Raises:
+        UnknownNameError: no bundled project has this name.
         FileError: the file cannot be read.
         ProjectError: it is not TOML, too large, or a key is missing, unknown or wrong.
     """
-    path = resolve_project(path)
+    path = _resolved(path)
     content = read_whole(path, what="The project file", largest=LARGEST_PROJECT_BYTES)
-    project = parse_project(content, path)
+    project = _parsed(content, path)
     with _named(path, ""):
         return _system(project, path, content.decode("utf-8-sig"))
 
 
-def parse_project(content: bytes, path: Path) -> Any:
-    """Check a project file's text against the schema.
+def _resolved(text: str | Path) -> Path:
+    """The path of a project file, which may be a bundled one."""
+    if not str(text).startswith("bundled:"):
+        return Path(text)
+    name = str(text).removeprefix("bundled:").removesuffix(".toml")
+    return bundled(name, ending=".toml", what="project")
 
-    Args:
-        content: TOML, UTF-8.
-        path: what messages call it.
 
-    Returns:
-        The parsed `Project`.
-
-    Raises:
-        ProjectError: the first thing that is wrong, with its key and what would be right.
-    """
+def _parsed(content: bytes, path: Path) -> Project:
+    """A project file's text, checked against the schema; the first thing that is wrong is an
+    error."""
     from pydantic import ValidationError
 
     try:
@@ -142,9 +117,10 @@ def _system(project: Any, path: Path, text: str) -> System:
     folder = path.parent
     with _named(path, "robot"):
         robot = load_robot(
-            resolve_urdf(project.robot.urdf, relative_to=folder),
+            project.robot.urdf,
             floating_base=project.robot.base == "floating",
             actuated=project.robot.actuated,
+            relative_to=folder,
         )
     law = Law(
         tasks=tuple(_task(section) for section in project.tasks),
@@ -176,6 +152,7 @@ def _system(project: Any, path: Path, text: str) -> System:
         walking=walking_of(project.walking, robot),
         source=Source(
             text=text,
+            project=project,
             files=tuple(file for file in files if file is not None),
             motion_file=motion_file,
         ),
@@ -184,7 +161,7 @@ def _system(project: Any, path: Path, text: str) -> System:
 
 def _fed_back(section: Any) -> Signal:
     """The signal of [controller], with the tank's settings where it is the tank."""
-    signal = signal_named(section.feedback)
+    signal = Signal.named(section.feedback)
     if isinstance(signal, Tank):
         return Tank(
             energy=section.tank_energy_j,
@@ -216,7 +193,7 @@ def _posture(section: Any, robot: Robot, path: Path) -> Array:
             'stays where the URDF has it; remove the key, or let the base be "floating".'
         )
     length = float(np.linalg.norm(section.base_quaternion_xyzw))
-    if abs(length - 1.0) > UNIT_TOLERANCE:
+    if abs(length - 1.0) > robot.UNIT_TOLERANCE:
         raise ProjectError(
             f"{path}: posture.base_quaternion_xyzw has length {length:.4g}; 1 is right, in the "
             "order x, y, z, w."
@@ -227,7 +204,7 @@ def _posture(section: Any, robot: Robot, path: Path) -> Array:
             base_position=section.base_position,
             base_quaternion=section.base_quaternion_xyzw,
         )
-        require_within_limits(robot, q)
+        robot.require_within_limits(q)
     return q
 
 
@@ -269,7 +246,7 @@ def _actuators(section: Any, robot: Robot, path: Path) -> Actuators:
         columns[key] = [values[key] for values in every]
     for key in optional:
         columns[key] = [values.get(key, _left_out(key)) for values in every]
-    return actuators_of(robot, **columns)
+    return Actuators.of_robot(robot, **columns)
 
 
 def _left_out(key: str) -> float:
@@ -318,7 +295,7 @@ def _packets(keys: Any) -> dict[str, Any]:
     }
 
 
-def _signal(section: Any, folder: Path) -> DelaySignal:
+def _signal(section: Any, folder: Path) -> Constant | Sinusoid | Table:
     match section.kind:
         case "constant":
             return Constant(section.value_ms * 1e-3)
@@ -335,7 +312,7 @@ def _signal(section: Any, folder: Path) -> DelaySignal:
             return _samples(section, folder)
 
 
-def _samples(section: Any, folder: Path) -> DelaySignal:
+def _samples(section: Any, folder: Path) -> Table:
     """Measured delays: one number (ms) a line."""
     path = folder / section.file
     content = read_whole(path, what="The delay samples", largest=LARGEST_SAMPLES_BYTES)

@@ -3,16 +3,16 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sealag.design._along import Along
 from sealag.design._criteria import bounds_along
 from sealag.design._jitter import loops_at
-from sealag.design._local import local_of
-from sealag.design._system import System
 from sealag.errors import ContractionError, InputError
 from sealag.margin import SampledMargin, sampled_margin
 from sealag.passivity import Criterion
+
+if TYPE_CHECKING:
+    from sealag.design._system import System
 
 RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0)
 """Hz, of a sweep if nothing else is asked for."""
@@ -48,23 +48,15 @@ class Rate:
         }
 
 
-def rate_sweep(system: System, rates: Sequence[float] = RATES) -> tuple[Rate, ...]:
-    """Return what each sample rate tolerates, in the design's posture; docs/theory section 7.6.
-
-    The controller samples, computes and holds once a period; its delay is that of the design's
-    links without the hold. Where the law sags, posture and rest both count.
+def rate_sweep(system: "System", rates: Sequence[float]) -> tuple[Rate, ...]:
+    """Return what `System.rate_sweep` does.
 
     Args:
         system: the design.
-        rates: Hz; the design's own comes on top.
-
-    Raises:
-        InputError: torque feedback is late in the drives: the loop has two delays.
-        ContractionError: q̄(θ) is fed back and does not exist.
-        SolverError: rounding leaves a jitter margin open.
+        rates: Hz.
     """
-    along = Along(system=system, motion=system.still())
-    local = local_of(along, bounds_along(along, Criterion.CERTIFIED).bound.delay)
+    along = system.along()
+    local = along.local(bounds_along(along, Criterion.CERTIFIED).bound.delay)
     if local.loop is None:
         raise ContractionError(local.problem)
     loops = list(loops_at(along, 0, local))

@@ -1,7 +1,6 @@
 """Checking a certificate against the design that it names."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +11,12 @@ from sealag.design._certify import certify
 from sealag.design._criteria import delayed_stiffness
 from sealag.design._system import System
 from sealag.errors import InputError
-from sealag.passivity import (
-    Certificate,
-    Check,
-    Criterion,
-    InstantProof,
-    LocalLoop,
-    Verification,
-    read_certificate,
-    verify,
-)
+from sealag.passivity import Certificate, Criterion, InstantProof, LocalLoop, Verification
 from sealag.robot import Motion
 from sealag.typing import Array
+
+_Check = tuple[str, bool, str]
+"""Name, whether it holds, and detail."""
 
 AGREEMENT = 1e-6
 """Relative difference up to which recomputed numbers agree: machines round differently, and bounds
@@ -72,35 +65,32 @@ def verify_design(
         CertificateError: it is not a certificate, or its arrays do not fit each other.
         RobotError: a mass matrix is not positive definite.
     """
-    found = verify(certificate, exact=exact)
-    claimed = read_certificate(certificate)
+    found = Certificate.verify(certificate, exact=exact)
+    claimed = Certificate.read(certificate)
     count = claimed.question.instants
     if motion is None and count > 1:
         raise InputError(f"The certificate is of a motion of {count} instants; name it (--motion).")
-    checks = found.checks
-    if found.valid:
-        checks += tuple(_recomputed(claimed, system, motion))
-    return replace(found, checks=checks)
+    return found.extended(_recomputed(claimed, system, motion)) if found.valid else found
 
 
-def _recomputed(claimed: Certificate, system: System, motion: Motion | None) -> Iterator[Check]:
+def _recomputed(claimed: Certificate, system: System, motion: Motion | None) -> Iterator[_Check]:
     """What follows from robot, project and motion."""
     proofs, kind = claimed.evidence.proofs, claimed.question.criterion
     fresh = certify(system, motion, criterion=kind, proofs=max(len(proofs), 1))
     for name, digest in fresh.question.hashes.items():
         same = claimed.question.hashes.get(name) == digest
         words = "the file's SHA-256" if same else f"the certificate is of another {name} file"
-        yield Check(name=f"{name} file", ok=same, detail=words)
+        yield (f"{name} file", same, words)
     data = claimed.to_json_dict()
     for name, value in fresh.to_json_dict().items():
         if name not in _NOT_UNIQUE:
             where = _difference(data[name], value)
             words = where.removeprefix(":").strip() or "as computed anew"
-            yield Check(name=f"design: {name}", ok=not where, detail=words)
+            yield (f"design: {name}", not where, words)
     yield _versions(claimed.answer.versions, fresh.answer.versions)
     if not np.array_equal(claimed.evidence.time_s, fresh.evidence.time_s):
         return
-    along = Along(system=system, motion=system.still() if motion is None else motion)
+    along = system.along(motion)
     F = delayed_stiffness(along.at([proof.instant for proof in proofs]), system, kind)
     for proof, found in zip(proofs, F, strict=True):
         yield _matrices(proof, fresh.evidence.proof_of(proof.instant), found)
@@ -130,7 +120,7 @@ def _agrees(claimed: Any, found: Any) -> bool:
     return type(claimed) is type(found) and claimed == found
 
 
-def _matrices(claimed: InstantProof, fresh: InstantProof | None, F: Array) -> Check:
+def _matrices(claimed: InstantProof, fresh: InstantProof | None, F: Array) -> _Check:
     pairs = [(claimed.F, F)]
     if fresh is not None:
         pairs += [
@@ -140,7 +130,7 @@ def _matrices(claimed: InstantProof, fresh: InstantProof | None, F: Array) -> Ch
         ]
     gap = max(_gap(one, other) for one, other in pairs)
     name = f"design: J*, S, F at instant {claimed.instant}"
-    return Check(name=name, ok=gap <= AGREEMENT, detail=f"to {gap:.1e}")
+    return (name, gap <= AGREEMENT, f"to {gap:.1e}")
 
 
 def _gap(claimed: Array, found: Array) -> float:
@@ -151,20 +141,20 @@ def _gap(claimed: Array, found: Array) -> float:
     return float(np.abs(claimed - found).max(initial=0.0)) / size
 
 
-def _versions(claimed: Mapping[str, str], here: Mapping[str, str]) -> Check:
+def _versions(claimed: Mapping[str, str], here: Mapping[str, str]) -> _Check:
     """Another sealag answers in its own way; other libraries round in another way, and may."""
     same = set(claimed) == set(here) and claimed["sealag"] == here["sealag"]
     others = [f"{name} {v}" for name, v in claimed.items() if v != here.get(name)]
     words = f"others than here: {', '.join(others)}" if others else "those here"
-    return Check(name="design: versions", ok=same, detail=words)
+    return ("design: versions", same, words)
 
 
-def _loop(claimed: LocalLoop | None, fresh: LocalLoop | None) -> Check:
+def _loop(claimed: LocalLoop | None, fresh: LocalLoop | None) -> _Check:
     """The frozen loop, whatever the coordinates z: what torques of motors and drives do to them."""
     name = "design: local_loop"
     if claimed is None or fresh is None:
         words = "none" if fresh is None else "it has one"
-        return Check(name=name, ok=claimed is fresh, detail=words)
+        return (name, claimed is fresh, words)
     pairs = (
         ("at", claimed.at, fresh.at),
         ("states", list(claimed.states), list(fresh.states)),
@@ -173,15 +163,15 @@ def _loop(claimed: LocalLoop | None, fresh: LocalLoop | None) -> Check:
     )
     for key, one, other in pairs:
         if where := _difference(one, other, f"local_loop.{key}"):
-            return Check(name=name, ok=False, detail=where)
+            return (name, False, where)
     if (claimed.A_e is None) != (fresh.A_e is None):
-        return Check(name=name, ok=False, detail="A_e is there in one of both only")
+        return (name, False, "A_e is there in one of both only")
     gap = max(
         _gap(_answers(claimed, s), _answers(fresh, s))
         for s in _PROBES * (fresh.frequency_rad_s or 10.0)
     )
     words = f"motors answer to torques as computed anew, to {gap:.1e}"
-    return Check(name=name, ok=gap <= AGREEMENT, detail=words)
+    return (name, gap <= AGREEMENT, words)
 
 
 def _answers(loop: LocalLoop, s: complex) -> Array:
@@ -197,7 +187,7 @@ def _answers(loop: LocalLoop, s: complex) -> Array:
     return np.stack(answers)
 
 
-def _common(claimed: Certificate, W: Array, along: Along) -> Check:
+def _common(claimed: Certificate, W: Array, along: Along) -> _Check:
     """[[2D − W, dF], [dFᵀ, W]] at every instant, in doubles."""
     d, D = claimed.answer.common_multiplier_delay_s, claimed.question.D_theta
     lowest = np.inf
@@ -207,8 +197,8 @@ def _common(claimed: Certificate, W: Array, along: Along) -> Check:
         corner = np.broadcast_to(2.0 * np.diag(D) - W, F.shape)
         both = np.block([[corner, d * F], [d * np.swapaxes(F, 1, 2), whole]])
         lowest = min(lowest, float(np.linalg.eigvalsh(both).min()))
-    return Check(
-        name=f"design: common multiplier at all {len(along.motion)} instants",
-        ok=bool(lowest >= -AGREEMENT * D.max()),
-        detail=f"lowest eigenvalue {lowest:.3e}",
+    return (
+        f"design: common multiplier at all {len(along.motion)} instants",
+        bool(lowest >= -AGREEMENT * D.max()),
+        f"lowest eigenvalue {lowest:.3e}",
     )

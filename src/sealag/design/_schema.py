@@ -22,8 +22,8 @@ from sealag.delay import PacketOrder
 from sealag.passivity import Criterion
 from sealag.robot import ContactKind
 from sealag.whole_body import (
-    SIGNAL_NAMES,
     GravityCompensation,
+    Signal,
     StiffnessForm,
     TankFlow,
     TaskError,
@@ -149,7 +149,7 @@ class ContactSection(Section):
 class ControllerSection(Section):
     """[controller]"""
 
-    feedback: Annotated[str, _one_of(SIGNAL_NAMES)]
+    feedback: Annotated[str, _one_of(Signal.names())]
     gravity: Annotated[str, _one_of(GravityCompensation)]
     stiffness_form: Annotated[str, _one_of(StiffnessForm)] = StiffnessForm.SYMMETRIC.value
     task_inertia: Annotated[str, _one_of(TaskInertia)] = TaskInertia.LAMBDA_TS.value

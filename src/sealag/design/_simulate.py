@@ -7,24 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from sealag.design._criteria import certified_bounds
 from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.robot import ContactKind
-from sealag.simulation import (
-    Clock,
-    Foot,
-    Network,
-    Push,
-    Run,
-    Scene,
-    closed_loop,
-    fastest_link,
-)
+from sealag.simulation import Clock, Foot, Network, Push, Run, Scene, closed_loop
 from sealag.typing import Array
 from sealag.units import seconds_from_ms
-from sealag.walking import GroundProfile, Walking, begin_walk
+from sealag.walking import GroundProfile, Walking
 from sealag.whole_body import Controller, TaskKind, TickController
 
 LONGEST_STEP = 1e-3
@@ -84,7 +74,7 @@ def simulate(
         raise InputError(f"The scenario is {kind!r}; it must be {either(SCENARIOS)}.")
     if seed is not None and not (isinstance(seed, int) and seed >= 0):
         raise InputError(f"The seed is {seed!r}; it must be a whole number from 0 up.")
-    length = scenario_duration(system, kind) if duration is None else duration
+    length = system.duration(kind) if duration is None else duration
     if not (isinstance(length, int | float) and 0.0 < length <= LONGEST_RUN):
         raise InputError(f"The duration is {length!r} s; it must be more than 0, at most 1e9 s.")
     if log_period is None and setting.log_period_ms is not None:
@@ -99,7 +89,7 @@ def simulate(
         "progress": progress,
     }
     if kind == "walk" or (kind == "balance" and system.walking is not None):
-        walking = _walking(system)
+        walking = system.required_walking()
         walking = walking if kind == "walk" else _on_the_spot(walking)
         return _walk(system, walking, _pushes(system, kind), common)
     feet = _feet(system)
@@ -140,7 +130,7 @@ def _with_delay_storage(run: Run, system: System, q: Array) -> Run:
     if run.audit.controller_side is None or len(run.time) < 3:
         return run
     motion = replace(system.still(), q=q[None])
-    bound = certified_bounds(system.spaces(motion), system)
+    bound = system.certified_bounds(system.spaces(motion))
     delay = float(bound.delay[0])
     if not 0.0 < delay < math.inf:
         return run
@@ -150,35 +140,13 @@ def _with_delay_storage(run: Run, system: System, q: Array) -> Run:
     return replace(run, audit=audit)
 
 
-def scenario_duration(system: System, scenario: str | None = None) -> float:
-    """Return how long a scenario runs unless told otherwise, s.
-
-    Args:
-        system: the design.
-        scenario: its name; the project's if None.
-
-    Raises:
-        InputError: it is a walk and the project describes none.
-    """
-    kind = system.simulation.scenario if scenario is None else scenario
-    return _walking(system).duration if kind == "walk" else system.simulation.duration_s
-
-
-def _walking(system: System) -> Walking:
-    if system.walking is None:
-        raise InputError(
-            f"The project {system.name} has no [walking] section; give its feet = [left, right]."
-        )
-    return system.walking
-
-
 def _on_the_spot(walking: Walking) -> Walking:
     gait = replace(walking.gait, apex_speed=_SPOT_SPEED)
     return replace(walking, gait=gait, ground=GroundProfile.flat())
 
 
 def _walk(system: System, walking: Walking, pushes: Sequence[Push], common: dict[str, Any]) -> Run:
-    start = begin_walk(system.robot, system.actuators, walking, period=common["clock"].central)
+    start = walking.begin(system.robot, system.actuators, period=common["clock"].central)
     return closed_loop(
         system.robot,
         system.actuators,
@@ -275,7 +243,7 @@ def _clock(system: System) -> Clock:
             f"multiple of the embedded one of {embedded * 1e3:g} ms (delays.embedded_period_ms), "
             "as a run needs it; change one of them."
         )
-    rate, _ = fastest_link(system.robot, system.actuators, system.posture)
+    rate, _ = system.actuators.fastest_link(system.robot, system.posture)
     longest = max(SHORTEST_STEP, 2.0 * math.pi / (STEPS_PER_SWING * rate))
     whole = embedded or central
     coarsest = math.ceil(whole / min(LONGEST_STEP, longest) - 1e-9)

@@ -7,7 +7,7 @@ import numpy as np
 
 from sealag.design._starter_text import OPTIONAL, REQUIRED
 from sealag.errors import InputError
-from sealag.robot import ReferencePosture, Robot, load_robot, reference_posture
+from sealag.robot import Robot, load_robot
 from sealag.typing import Array
 
 
@@ -35,7 +35,6 @@ def starter_project(
     """
     robot = load_robot(urdf, floating_base=floating_base)
     feet = _feet(robot) if floating_base else []
-    reference = reference_posture(robot)
     rotor = robot.rotor_inertia
     known = bool((rotor > 0.0).all())
     required = REQUIRED.format(
@@ -43,7 +42,7 @@ def starter_project(
         urdf=_text((str(urdf) if named is None else named).replace("\\", "/")),
         base="floating" if floating_base else "fixed",
         actuated="\n".join(f"  {_text(name)}," for name in robot.joints),
-        posture=_posture(robot, feet, reference),
+        posture=_posture(robot, feet),
         rotor=f"{rotor.min():.6g}"
         if known
         else '"FILL: B reflected to the joint, kg m^2 (kg where the joint slides)"',
@@ -73,9 +72,9 @@ def _key(name: str) -> str:
     return name if plain.isascii() and plain.isalnum() else _text(name)
 
 
-def _posture(robot: Robot, feet: list[str], reference: ReferencePosture | None) -> str:
+def _posture(robot: Robot, feet: list[str]) -> str:
     """The section's lines: base, and joints with where their values come from."""
-    carrying = np.zeros(robot.n, dtype=bool)
+    carrying, reference = np.zeros(robot.n, dtype=bool), robot.reference_posture()
     if reference is not None:
         origin = f"{_text(reference.name)} of {_text(reference.file.name)}; rad or m"
         positions = np.array([reference.joints[name] for name in robot.joints])

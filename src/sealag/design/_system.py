@@ -1,7 +1,7 @@
 """A design: robot, actuators, law, contacts, posture and delays."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,10 +10,15 @@ import numpy as np
 
 from sealag.actuation import Actuators
 from sealag.delay import Delays
-from sealag.design._schema import SimulationSection
-from sealag.errors import InputError
-from sealag.passivity import Criterion
-from sealag.robot import Contact, Motion, Robot, require_within_limits
+from sealag.design._along import Along
+from sealag.design._criteria import certified_bounds
+from sealag.design._margins import LocalMargins, local_margins
+from sealag.design._motion_file import save_motion
+from sealag.design._rates import RATES, Rate, rate_sweep
+from sealag.design._schema import Project, SimulationSection
+from sealag.errors import InputError, either
+from sealag.passivity import Bound, Criterion
+from sealag.robot import Contact, Motion, Robot
 from sealag.typing import Array, ArrayLike
 from sealag.walking import Walking
 from sealag.whole_body import (
@@ -28,17 +33,26 @@ if TYPE_CHECKING:
     from sealag.simulation import Run
 
 
+MOST_INSTANTS = 1_400_000
+"""Instants of one certificate: its file has at most 100 MB, and up to 70 bytes an instant."""
+
+PROOF_COUNT = 12
+"""Instants whose numbers a certificate holds if nothing else is asked for."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
     """The project file that a system was read from.
 
     Attributes:
         text: the file's own text, which recordings carry along.
+        project: its keys, checked, with the defaults of those that it leaves out.
         files: everything that was read: project, URDF, motion, delay samples.
         motion_file: the project's own motion, if it names one.
     """
 
     text: str
+    project: Project
     files: tuple[Path, ...]
     motion_file: Path | None
 
@@ -96,7 +110,7 @@ class System:
                 f"The posture has shape {self.posture.shape}; ({self.robot.nq},) is right, as "
                 "`Robot.configuration` makes it."
             )
-        require_within_limits(self.robot, self.posture)
+        self.robot.require_within_limits(self.posture)
         if self.contacts and not self.robot.floating_base:
             raise InputError(
                 "The robot's base is fixed, but contacts hold frames to the ground as well; leave "
@@ -137,6 +151,148 @@ class System:
             contact_sets=(self.contacts,),
             contact_index=np.zeros(1, dtype=np.int64),
         )
+
+    def save_motion(self, motion: Motion, path: str | Path) -> None:
+        """Write a motion of the robot as CSV, NPZ or Parquet through a temporary name.
+
+        Args:
+            motion: the motion.
+            path: the file; its ending tells the format.
+
+        Raises:
+            FileError: it cannot be written.
+            MotionError: the ending is none of the three.
+        """
+        save_motion(motion, self.robot, path)
+
+    def along(self, motion: Motion | None = None) -> Along:
+        """Return what the law's matrices and stability along a motion are asked of.
+
+        Args:
+            motion: its instants; the posture if None.
+        """
+        return Along(system=self, motion=self.still() if motion is None else motion)
+
+    def local_margins(
+        self, motion: Motion | None = None, *, horizon: float | None = None
+    ) -> LocalMargins:
+        """Decide the exact local margin of the law that runs, and its jitter margin, over a motion.
+
+        The margin is necessary and sufficient for local stability at constant delay with frozen
+        coefficients, the jitter margin sufficient for delays that vary; both at the equilibrium of
+        the loop that holds an instant. The delay is d_1, the sum of all ways around the loop;
+        delayed torque feedback in the drives has a delay of its own. Instants that a potential
+        decides are computed only where their passive bound lies below the smallest margin.
+
+        Args:
+            motion: the motion; the system's posture if None.
+            horizon: longest delay up to which the ranges of stable and unstable delay are listed,
+                s.
+
+        Raises:
+            InputError: the horizon is not a positive time.
+            ContractionError: q̄(θ) is fed back and does not exist.
+            SolverError: the margin at the instant that sets it could not be decided.
+        """
+        return local_margins(self, motion, horizon)
+
+    def rate_sweep(self, rates: Sequence[float] = RATES) -> tuple[Rate, ...]:
+        """Return what each sample rate tolerates, in the posture; docs/theory section 7.6.
+
+        The controller samples, computes and holds once a period; its delay is that of the design's
+        links without the hold. Where the law sags, posture and rest both count.
+
+        Args:
+            rates: Hz; the design's own comes on top.
+
+        Raises:
+            InputError: torque feedback is late in the drives: the loop has two delays.
+            ContractionError: q̄(θ) is fed back and does not exist.
+            SolverError: rounding leaves a jitter margin open.
+        """
+        return rate_sweep(self, rates)
+
+    def certified_bounds(
+        self, spaces: Spaces, rest: Rest | None = None, motion: Motion | None = None
+    ) -> Bound:
+        """Bound every instant by the criterion of docs/theory section 6 for the law that is run.
+
+        Sufficient for a passive controller side along the frozen motion: the signal is one that a
+        potential can belong to, the drives are ideal, the motors carry the static load, no contact
+        or task is singular, the whole delayed stiffness F_θ is symmetric, the task stiffness
+        positive semidefinite, and d_1 ≤ 1 / w(D^-½ F_θ D^-½).
+
+        Args:
+            spaces: the law's matrices.
+            rest: where the loop rests in its posture; None for a motion.
+            motion: whose speeds the motors must reach; None for a posture.
+
+        Returns:
+            The bound of each instant, 0 where a condition fails.
+        """
+        return certified_bounds(spaces, self, rest, motion)
+
+    def criterion_asked(
+        self,
+        motion: Motion | None = None,
+        criterion: Criterion | str | None = None,
+        *,
+        time_varying: bool = False,
+        proofs: int | None = PROOF_COUNT,
+    ) -> Criterion:
+        """Return the criterion that `certify` would use, if what it is asked has an answer.
+
+        Args:
+            motion: the motion, or None.
+            criterion: what is asked for, or None.
+            time_varying: whether a bound for matrices that move is asked for.
+            proofs: how many instants with their numbers; None for all.
+
+        Raises:
+            InputError: as `certify` raises it.
+        """
+        if not isinstance(motion, Motion | None):
+            raise InputError(f"motion is {motion!r}; load_motion makes a Motion of a file.")
+        if motion is not None and len(motion) > MOST_INSTANTS:
+            raise InputError(
+                f"The motion has {len(motion)} instants; a certificate holds {MOST_INSTANTS} at "
+                "most. Certify parts of the motion, or fewer of its rows."
+            )
+        if proofs is not None and not (isinstance(proofs, int) and proofs >= 1):
+            raise InputError(f"proofs is {proofs!r}; it must be a whole number from 1 up, or None.")
+        name = self.criterion if criterion is None else criterion
+        if name not in set(Criterion):
+            raise InputError(f"criterion is {name!r}; it must be {either(list(Criterion))}.")
+        if time_varying and (name == Criterion.PUBLISHED or motion is None or len(motion) < 2):
+            raise InputError(
+                "A time-varying bound needs the certified criterion and a motion of more than one "
+                "instant (--motion)."
+            )
+        return Criterion(name)
+
+    def duration(self, scenario: str | None = None) -> float:
+        """Return how long a scenario runs unless told otherwise, s.
+
+        Args:
+            scenario: its name; the project's if None.
+
+        Raises:
+            InputError: it is a walk and the project describes none.
+        """
+        kind = self.simulation.scenario if scenario is None else scenario
+        return self.required_walking().duration if kind == "walk" else self.simulation.duration_s
+
+    def required_walking(self) -> Walking:
+        """Return the walk that the project describes.
+
+        Raises:
+            InputError: it describes none.
+        """
+        if self.walking is None:
+            raise InputError(
+                f"The project {self.name} has no [walking] section; give its feet = [left, right]."
+            )
+        return self.walking
 
     def spaces(self, motion: Motion | None = None) -> Spaces:
         """Return the law's matrices along a motion; at the posture if None.

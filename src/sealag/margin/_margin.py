@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,16 +18,22 @@ from sealag.margin._loop import (
     undamped_whatever_the_delay,
 )
 from sealag.margin._pictures import Picture, Turn, frequency_of
-from sealag.margin._roots import loop_roots
+from sealag.margin._roots import loop_roots, rightmost_roots
 from sealag.margin._search import search
 from sealag.typing import Array, ArrayLike
 from sealag.units import in_ms
+
+if TYPE_CHECKING:
+    from sealag.whole_body import FrozenLoop
 
 _RESIDUAL = 1e-9
 _AT = 1e-9
 _MOST_IF_UNSTABLE = 3_000
 """Samples spent on the first crossing of an unstable loop. Robots need tens to hundreds; ten times
 more take half a minute for zero roots that hide the crossings."""
+_DRIFT = 1e-9
+"""1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
+_MOST_DRIFTING = 8  # zero roots that are counted
 _MOST_LISTED = 10_000
 """Crossings listed up to a horizon. Ten times more are 10 MB of JSON that nobody reads; ten times
 fewer refuse a stiff loop over a few of its slowest periods."""
@@ -88,6 +94,32 @@ class DelayMargin:
     guaranteed: bool
     residual: float
     method: str
+
+    @classmethod
+    def of_loop(cls, loop: "FrozenLoop", **choices: Any) -> "DelayMargin":
+        """Return the exact margin of a robot's frozen loop; see `delay_margin`.
+
+        Where compensation cancels gravity, what is left of a zero root is the rounding of the
+        loop's entries: a root without delay that is no further than that from the axis is not
+        stable.
+
+        Args:
+            loop: the loop.
+            choices: further arguments of `delay_margin`.
+        """
+        parts: dict[str, Any] = {
+            "A_e": loop.A_e,
+            "embedded_delay": loop.embedded_delay,
+            "symmetries": loop.symmetries,
+        }
+        found = delay_margin(loop.A_0, loop.A_1, **parts, **choices)
+        if found.unstable_roots or not len(loop.A_0):
+            return found
+        roots = rightmost_roots(loop.A_0, loop.A_1, 0.0, count=_MOST_DRIFTING, **parts)
+        drifting = int((roots.real > -_DRIFT).sum())
+        if not drifting:
+            return found
+        return replace(found, delay=0.0, unstable_roots=drifting, guaranteed=False)
 
 
 def delay_margin(

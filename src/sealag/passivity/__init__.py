@@ -1,22 +1,21 @@
 """Passivity criteria: how much delay a design tolerates, and the proof of it.
 
 `solve` answers a `Problem` with a `Bound`, for a multiplier that each `Instant`, a whole `Motion`
-or polytopes in `Windows` share. A `Certificate` is question, answer and evidence; `verify` checks
-it from its own numbers, without the code that made it.
+or polytopes in `Windows` share. A `Certificate` is question, answer and evidence;
+`Certificate.verify` checks it from its own numbers, without the code that made it.
 """
 
-from sealag.passivity._bound import Bound, Joined
-from sealag.passivity._certificate import Certificate, write_certificate
-from sealag.passivity._checks import Check, Verification
+from sealag.passivity._bound import Bound
+from sealag.passivity._certificate import Certificate
+from sealag.passivity._checks import Verification
 from sealag.passivity._kinds import Basis, Criterion, Place, Status
 from sealag.passivity._local import LocalLoop
 from sealag.passivity._problem import Problem
-from sealag.passivity._proofs import InstantProof, Window
+from sealag.passivity._proofs import InstantProof
 from sealag.passivity._solve import Instant, Motion, max_delay, solve
 from sealag.passivity._solvers import ClarabelCvxpy, ClarabelDirect, Solution, Solver
 from sealag.passivity._stated import Evidence
 from sealag.passivity._statement import Answer, Assumption, Critical, Question, Rest, Worst
-from sealag.passivity._verify import read_certificate, verify
 from sealag.passivity._windows import Windows
 
 __all__ = [
@@ -25,7 +24,6 @@ __all__ = [
     "Basis",
     "Bound",
     "Certificate",
-    "Check",
     "ClarabelCvxpy",
     "ClarabelDirect",
     "Criterion",
@@ -33,7 +31,6 @@ __all__ = [
     "Evidence",
     "Instant",
     "InstantProof",
-    "Joined",
     "LocalLoop",
     "Motion",
     "Place",
@@ -44,12 +41,8 @@ __all__ = [
     "Solver",
     "Status",
     "Verification",
-    "Window",
     "Windows",
     "Worst",
     "max_delay",
-    "read_certificate",
     "solve",
-    "verify",
-    "write_certificate",
 ]

@@ -10,6 +10,7 @@ from sealag.errors import InputError
 from sealag.passivity._measure import Complement, factorise
 from sealag.passivity._multipliers import multiplier_for
 from sealag.passivity._problem import Problem, symmetric, transposed
+from sealag.passivity._proofs import Window
 from sealag.passivity._solvers import ClarabelDirect, Solver
 from sealag.typing import Array, BoolArray
 
@@ -72,6 +73,15 @@ class Bound:
     binding: tuple[int, ...] = ()
     windows: tuple[Polytope, ...] = ()
 
+    @staticmethod
+    def by_parts(count: int) -> "Joined":
+        """Return what joins the bound of a motion from its parts.
+
+        Args:
+            count: how many instants there will be.
+        """
+        return Joined(count)
+
     @property
     def width(self) -> Array:
         """Relative width of the bracket, (…)."""
@@ -116,6 +126,28 @@ class Bound:
             return ()
         W = symmetric(self.multiplier)
         return tuple(W[rows, rows] for rows in self.problem.rows)
+
+    def stated_windows(self, D_theta: Array) -> tuple[Window, ...]:
+        """Return the polytopes of a time-varying bound in Nm/rad, as certificates state them.
+
+        Args:
+            D_theta: (n,) motor damping, Nms/rad.
+        """
+        root = np.sqrt(D_theta)[:, None]
+        found = []
+        for one in self.windows:
+            centre, *axes = root * one.M
+            kept = [axis for axis in axes if axis.any()]
+            found.append(
+                Window(
+                    first=one.first,
+                    last=one.last,
+                    centre=centre,
+                    axes=np.array(kept).reshape(-1, *centre.shape),
+                    radius=one.radius,
+                )
+            )
+        return tuple(found)
 
     def residual(self) -> Residual:
         """Measure 2I − JᵀWJ − d² M W⁻¹ Mᵀ: its smallest eigenvalue over the instants.

@@ -1,25 +1,23 @@
-"""The certificate: it checks itself, and is written as JSON."""
+"""The certificate: it checks itself, is written as JSON, read strictly and verified."""
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 import numpy as np
 
 from sealag.errors import FileError
 from sealag.files import Draft, written_whole
-from sealag.passivity._checks import Check
+from sealag.passivity._checks import Check, Verification
 from sealag.passivity._claims import claim_checks
 from sealag.passivity._definite import Reader, doubles, rationals
 from sealag.passivity._layout import LARGEST_BYTES, encoded
+from sealag.passivity._reading import SCHEMA, content_check, content_digest, plain_of, typed
 from sealag.passivity._shared import common_checks, window_checks
 from sealag.passivity._stated import Stated
 from sealag.passivity._supremum import worst_checks
-
-SCHEMA = "sealag-certificate/4"
 
 _LONG = {
     "time_s",
@@ -52,6 +50,72 @@ class Certificate(Stated):
     def __bool__(self) -> NoReturn:
         """Refuse to be a truth value: a certificate that says no is still a certificate."""
         raise TypeError("A certificate has no truth value; read its `answer.status`.")
+
+    @classmethod
+    def read(cls, source: Path | str | Mapping[str, Any]) -> Self:
+        """Read a certificate, checking layout, types and sizes, but none of its claims.
+
+        Args:
+            source: a file, or the plain data in it.
+
+        Raises:
+            FileError: it cannot be read, or is larger than 100 MB.
+            CertificateError: it is not a certificate of this layout; the message names the key.
+        """
+        return typed(plain_of(source)[0], source, cls)
+
+    @classmethod
+    def verify(cls, source: Path | str | Mapping[str, Any], *, exact: bool = False) -> Verification:
+        """Check every inequality and every claim of a certificate from its own numbers.
+
+        Keys that are unknown, missing or there twice, other types, numbers that are not finite, and
+        lists that do not fit each other are errors, not failed checks.
+
+        Proven, in floating point with a rounding bound or, if `exact`, in rational arithmetic:
+
+        - each instant in `proofs`: S is symmetric positive semidefinite, F follows from J*, S, K
+          and the gravity gradient, F is symmetric, q̄(θ) contracts where it is fed back (these for
+          criterion `certified`), and the matrix inequality of `InstantProof` holds at its delay,
+          (29) or (31);
+        - no delay above `max_delay_upper_s` satisfies the criterion at the worst instant;
+        - the common multiplier at the instants in `proofs`, among them those that bind it;
+        - the time-varying multiplier in every window, at all vertices with the ball around them.
+
+        Computed anew in floating point, whether or not `exact`: the supremum of the criterion at
+        the worst instant, the motion that reaches it and the limiting direction; that the windows
+        hold the instants in `proofs`; unstable modes, margin and first crossing from the frozen
+        loop of the critical instant: jω is a root there, and discs around all eigenvalues exclude a
+        shorter delay (where a mode is unstable, or an embedded delay is in the loop, roots are
+        counted at four shorter delays instead). Status, smallest bound and margin, stability,
+        conservatism and all that follows from other keys are compared with what follows, and no
+        digit of the file differs from what was written.
+
+        Stated, not proven, as far as the file's other numbers do not contradict it: that the
+        numbers are the robot's and the design's (`hashes`, `joints`, `delay_s`, `time_s`,
+        `feedback`, `gravity`, `stiffness_form`, `task_inertia`, `levels`, `spring_damping`,
+        `viscous_friction`, `motor_inertia`, `rotor_inertia`, `torque_bandwidth`, the link side of
+        `local_loop`, `equilibrium`); what is said of instants without a proof (`bounds_s`,
+        `asymmetry`, `contraction`) and of others than the critical one (`instant_margins_s`,
+        `instant_basis`); `published_max_delay_s` of a `certified` certificate; and the words of
+        `reasons`, `left_open`, `assumptions` and `versions`. `sealag.design.verify_design` checks
+        these against project, URDF and motion.
+
+        Args:
+            source: a file, or the plain data in it.
+            exact: decide definiteness in rational arithmetic instead of floating point with a
+                rounding margin.
+
+        Returns:
+            All checks; `valid` only if each holds.
+
+        Raises:
+            FileError: the file cannot be read.
+            CertificateError: it is not a certificate, or its arrays do not fit each other.
+        """
+        data, odd = plain_of(source)
+        found = typed(data, source, cls)
+        checks = (content_check(data, found, odd), *found.checks(exact=exact))
+        return Verification(status=found.answer.status, exact=exact, checks=checks)
 
     def checks(self, *, exact: bool = False) -> Iterator[Check]:
         """Check every claim and every inequality again from the certificate's own numbers.
@@ -100,43 +164,26 @@ class Certificate(Stated):
         data = encoded(self)
         return {**data, "hashes": {**data["hashes"], "content": content_digest(data)}}
 
+    def write(self, path: Path | Draft) -> None:
+        """Write it as JSON, one field a line, through a temporary name.
 
-def content_digest(data: Mapping[str, Any]) -> str:
-    """SHA-256 of a certificate's canonical JSON without this digest itself.
+        Args:
+            path: where, or a draft of it; the folder is made if needed.
 
-    Args:
-        data: the certificate as plain data; doubles have one shortest decimal form, so that
-            equal numbers give equal digests.
-    """
-    others = {key: value for key, value in data["hashes"].items() if key != "content"}
-    content, digest = {**data, "hashes": others}, hashlib.sha256()
-    for at, key in enumerate(sorted(content)):
-        text = json.dumps(content[key], sort_keys=True, separators=(",", ":"), allow_nan=False)
-        digest.update(f"{',' if at else '{'}{json.dumps(key)}:{text}".encode())
-    digest.update(b"}")
-    return digest.hexdigest()
-
-
-def write_certificate(certificate: Certificate, path: Path | Draft) -> None:
-    """Write a certificate as JSON, one field a line, through a temporary name.
-
-    Args:
-        certificate: what to write.
-        path: where, or a draft of it; the folder is made if needed.
-
-    Raises:
-        FileError: it cannot be written, or is larger than what is read.
-    """
-    with written_whole(path) as file:
-        size = 0
-        for key, value in certificate.to_json_dict().items():
-            text = f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}"
-            line = f"{',' if size else '{'}\n{text}".encode()
-            size += len(line)
-            if size > LARGEST_BYTES:
-                name = path.asked if isinstance(path, Draft) else path
-                raise FileError(
-                    f"{name} would be larger than {LARGEST_BYTES / 1e6:g} MB; ask for fewer proofs."
-                )
-            file.write(line)
-        file.write(b"\n}\n")
+        Raises:
+            FileError: it cannot be written, or is larger than what is read.
+        """
+        with written_whole(path) as file:
+            size = 0
+            for key, value in self.to_json_dict().items():
+                text = f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}"
+                line = f"{',' if size else '{'}\n{text}".encode()
+                size += len(line)
+                if size > LARGEST_BYTES:
+                    name = path.asked if isinstance(path, Draft) else path
+                    raise FileError(
+                        f"{name} would be larger than {LARGEST_BYTES / 1e6:g} MB; "
+                        "ask for fewer proofs."
+                    )
+                file.write(line)
+            file.write(b"\n}\n")

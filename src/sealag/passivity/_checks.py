@@ -1,7 +1,8 @@
 """What a verification says."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
 
 from sealag.passivity._kinds import Status
 
@@ -43,6 +44,15 @@ class Verification:
     def valid(self) -> bool:
         """Whether every check holds: then what the file says follows from its numbers."""
         return all(check.ok for check in self.checks)
+
+    def extended(self, more: Iterable[tuple[str, bool, str]]) -> Self:
+        """Return the outcome with further checks.
+
+        Args:
+            more: name, whether it holds, and detail of each.
+        """
+        found = (Check(name=name, ok=ok, detail=detail) for name, ok, detail in more)
+        return replace(self, checks=(*self.checks, *found))
 
     def to_json_dict(self) -> dict[str, Any]:
         """Return the outcome as plain data with the key `valid`."""

@@ -4,13 +4,11 @@ from sealag.report._mcap import McapRecorder
 from sealag.report._mcap_reader import read_recording
 from sealag.report._mujoco import MujocoModel, mujoco_model
 from sealag.report._recording import write_run
-from sealag.report._summary import run_summary
 
 __all__ = [
     "McapRecorder",
     "MujocoModel",
     "mujoco_model",
     "read_recording",
-    "run_summary",
     "write_run",
 ]

@@ -13,7 +13,6 @@ from sealag.design import System
 from sealag.errors import InputError
 from sealag.report._mujoco_delays import StepCounts
 from sealag.robot import ContactKind
-from sealag.simulation import fastest_link
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body import Rest
 
@@ -96,7 +95,7 @@ def mujoco_model(system: System, *, step: float | None = None) -> MujocoModel:
     """
     _require_representable(system)
     drives = system.actuators
-    link_rate, _ = fastest_link(system.robot, drives, system.posture)
+    link_rate, _ = drives.fastest_link(system.robot, system.posture)
     motor_rate = np.sqrt((drives.spring_stiffness / drives.shaped_inertia).max())
     longest = min(LONGEST_STEP, 1.0 / (STEPS_PER_RADIAN * float(np.hypot(link_rate, motor_rate))))
     steps = StepCounts.of(system.delays, longest=longest, step=step)

@@ -17,6 +17,7 @@ def load_robot(
     *,
     floating_base: bool,
     actuated: Sequence[str] | None = None,
+    relative_to: Path = Path(),
 ) -> Robot:
     """Read a robot from a URDF; meshes are not needed.
 
@@ -26,6 +27,7 @@ def load_robot(
         actuated: names of the actuated joints; the other movable joints are locked at their
             neutral position. None takes all that do not mimic another one. A joint that mimics an
             actuated one follows it, one that mimics another is locked where that puts it.
+        relative_to: folder from which a relative path starts.
 
     Returns:
         The robot; its `joints` are in the model's order, whatever the order of `actuated`.
@@ -37,7 +39,7 @@ def load_robot(
         UnknownNameError: an actuated joint, a bundled robot, or a link or joint that a joint of the
             URDF names does not exist.
     """
-    path = resolve_urdf(str(urdf))
+    path = resolve_urdf(str(urdf), relative_to=relative_to)
     said = read_model(path, floating_base=floating_base)
     model, followers = reduce_model(said.model, path, actuated=actuated, followers=said.followers)
     if model.nq - model.nv != (1 if floating_base else 0):

@@ -1,11 +1,9 @@
 """Postures that a robot's maker names: the group states of an SRDF beside the URDF."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
-
-from sealag.robot._robot import Robot
 
 _NAMES = ("standing", "half_sitting", "homing", "home", "default", "neutral")
 
@@ -24,30 +22,28 @@ class ReferencePosture(NamedTuple):
     joints: dict[str, float]
 
 
-def reference_posture(robot: Robot) -> ReferencePosture | None:
+def posture_beside(urdf: Path, joints: Collection[str]) -> ReferencePosture | None:
     """Find a posture in an SRDF in the URDF's folder, or in the folder `srdf` there or beside it.
 
     The file with the URDF's own name goes first, and a posture to stand in before others.
 
     Args:
-        robot: whose posture is wanted; one that names fewer than half of its joints is another's.
-
-    Returns:
-        The posture; None if there is none.
+        urdf: the robot's file.
+        joints: its joints; a posture that names fewer than half of them is another robot's.
     """
-    folder, stem = robot.urdf_path.resolve().parent, robot.urdf_path.stem
+    folder, stem = urdf.resolve().parent, urdf.stem
     places = (folder, folder / "srdf", folder.parent / "srdf")
     files = [path for place in places for path in sorted(place.glob("*.srdf"))]
     found = [
         state
         for path in sorted(files, key=lambda path: path.stem != stem)
         for state in _states(path)
-        if 2 * len(state.joints.keys() & set(robot.joints)) >= robot.n
+        if 2 * len(state.joints.keys() & set(joints)) >= len(joints)
     ]
     for wanted in _NAMES:
         for state in found:
             if state.name.startswith(wanted):
-                known = {name: state.joints.get(name, 0.0) for name in robot.joints}
+                known = {name: state.joints.get(name, 0.0) for name in joints}
                 return state._replace(joints=known)
     return None
 

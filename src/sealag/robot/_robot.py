@@ -4,7 +4,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +12,9 @@ import pinocchio as pin
 from sealag.constants import GRAVITY
 from sealag.errors import InputError, UnknownNameError, near
 from sealag.robot._contact import Contact
+from sealag.robot._limits import refuse_outside
 from sealag.robot._mimic import Coupling, Follower, couple
+from sealag.robot._reference import ReferencePosture, posture_beside
 from sealag.robot._tree import frame_mounts, tree_of
 from sealag.robot._workspace import Workspace
 from sealag.typing import Array, ArrayLike, BoolArray
@@ -53,6 +55,9 @@ class Robot:
         mass: of everything that moves, kg; what is fixed to the world is not in it.
         tree: its bodies and joints, as compiled kernels take them.
     """
+
+    UNIT_TOLERANCE: ClassVar[float] = 1e-3
+    """How far the length of a base quaternion may be from 1: what rounding to a few digits does."""
 
     name: str
     urdf_path: Path
@@ -208,6 +213,27 @@ class Robot:
         return self._checked(
             np.concatenate([base, quaternion / norm, positions]), self.nq, "configuration"
         )
+
+    def require_within_limits(self, q: ArrayLike) -> None:
+        """Refuse configurations outside the URDF's position limits, or far outside any range.
+
+        A revolute joint without limits may turn by 4π either way, a sliding one move by 1 km.
+
+        Args:
+            q: (nq,) or (N, nq) rad and m.
+
+        Raises:
+            InputError: a position lies outside; the message names joint, row, value and limits.
+        """
+        refuse_outside(
+            q, self.joints, lower=self.position_lower, upper=self.position_upper,
+            sliding=self.sliding, floating=self.floating_base,
+        )  # fmt: skip
+
+    def reference_posture(self) -> ReferencePosture | None:
+        """Return the posture that an SRDF beside the URDF names, one to stand in before others;
+        None if there is none."""
+        return posture_beside(self.urdf_path, self.joints)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Return the joints' part (…, n) of configurations.

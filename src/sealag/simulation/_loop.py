@@ -11,7 +11,6 @@ from sealag.errors import InputError, SealagError, SolverError
 from sealag.kernels import keep
 from sealag.robot import Robot
 from sealag.simulation._audit import Books, Stated, UndelayedWork, audit
-from sealag.simulation._exchange import Exchanges
 from sealag.simulation._interrupt import Interrupt
 from sealag.simulation._memory import events_of, open_channels, open_log
 from sealag.simulation._network import Clock, Network
@@ -24,8 +23,6 @@ from sealag.store import release
 from sealag.typing import Array
 from sealag.whole_body import (
     Measurement,
-    StoringController,
-    TankController,
     TickController,
 )
 
@@ -135,9 +132,9 @@ class _Loop:
         n, feet = robot.n, len(scene.feet)
         allocate = {"nq": robot.nq, "nv": robot.nv, "n": n, "contacts": feet}
         self.truth, self.received = (Measurement.allocate(**allocate) for _ in range(2))
-        self._storing = controller if isinstance(controller, StoringController) else None
-        self._tank = controller if isinstance(controller, TankController) else None
-        self._given, self._said = UndelayedWork(n), math.inf if self._storing is None else -1.0
+        self._storage = getattr(controller, "storage", None)
+        self._tank: Any = controller if hasattr(controller, "tank_energy") else None
+        self._given, self._said = UndelayedWork(n), math.inf if self._storage is None else -1.0
         self._frames = frames
 
     # Start -------------------------------------------------------------------------------------
@@ -192,7 +189,7 @@ class _Loop:
         kernel, step = self._kernel, self.clock.physics
         self.plant.held.command[:], self.plant.held.known_torque[:] = self.first, 0.0
         self._log, self._store = open_log(self.plant, -(-steps // every) + 1)  # too long ends here
-        ways = Exchanges.plan(self._network, self.clock, duration=steps * step, seed=self.seed)
+        ways = self._network.plan(self.clock, duration=steps * step, seed=self.seed)
         self.exchanges = ways
         self._periods = kernel.Periods(
             step=step,
@@ -332,11 +329,9 @@ class _Loop:
     def _state(self) -> None:
         """Let the controller state its undelayed command and its potential."""
         time, channels = self.plant.time, self._channels
-        if self._storing is not None and time != self._said:
+        if self._storage is not None and time != self._said:
             self.plant.sense(time, self.truth.data)
-            channels.storage[0] = self._ask(
-                self._storing.storage, time, self.truth, self._given.command
-            )
+            channels.storage[0] = self._ask(self._storage, time, self.truth, self._given.command)
             self._given.move(self.plant.now.theta)
             self._said = time
         if self._tank is not None:
@@ -391,7 +386,7 @@ class _Loop:
                 shaped_inertia=actuators.shaped_inertia,
                 ratio=actuators.rotor_inertia / actuators.shaped_inertia,
                 stated=None
-                if self._storing is None
+                if self._storage is None
                 else Stated(
                     storage=log.storage,
                     tank=log.tank if log.tank.any() else None,

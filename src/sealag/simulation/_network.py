@@ -4,9 +4,15 @@ import math
 from dataclasses import dataclass
 from typing import Self
 
+import numpy as np
+
 from sealag.delay import Constant, Delays, Link, RoundTrip
 from sealag.errors import InputError
+from sealag.simulation._exchange import Exchanges
+from sealag.typing import Array
 from sealag.units import in_ms
+
+MOST_PACKETS = 2e7  # each takes about 130 bytes while their ways are planned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +69,54 @@ class Network:
             embedded_period=clock.embedded,
         ).d_1
 
+    def plan(self, clock: "Clock", *, duration: float, seed: int) -> Exchanges:
+        """Draw every packet's way: what the controller knows when, and what the drives obey.
+
+        Args:
+            clock: The periods.
+            duration: Of the run, s.
+            seed: Of jitter and losses; a longer run begins like a shorter one.
+
+        Raises:
+            InputError: There are too many packets.
+        """
+        packets = duration / min(clock.central, clock.embedded or clock.central)
+        if packets > MOST_PACKETS:
+            raise InputError(
+                f"The run would plan the ways of {packets:.3g} packets, of {MOST_PACKETS:.3g} at "
+                f"most; simulate for at most {duration * MOST_PACKETS / packets:.0f} s."
+            )
+        up, down, drive, torque = (
+            np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(4)
+        )
+        tick = _multiples(clock.central, duration)
+        looks = _multiples(clock.embedded, duration) if clock.embedded else None
+        if looks is None:
+            seen = self.central_up.sent(tick, up)
+        else:
+            arrival = self.central_up.arrivals(looks, up)
+            seen = looks[np.maximum(self.central_up.held(arrival, tick), 0)]
+        arrival = self.central_down.arrivals(tick, down)
+        passed = np.sort(self.central_down.due(tick, arrival)) if looks is None else looks
+        master = self.central_down.held(arrival, passed)
+        late = self.embedded_down.arrivals(passed, drive)
+        if looks is None:
+            taken, number = self.embedded_down.takings(late)
+        else:
+            taken, number = looks, self.embedded_down.held(late, looks)
+        command = np.where(number >= 0, master[number], -1)
+        fresh = np.flatnonzero(np.diff(command, prepend=-1))
+        known = None
+        if self.embedded_up is not None:
+            known = _torque(self.embedded_up, clock, duration, torque)
+        return Exchanges(
+            tick=tick,
+            seen=np.maximum(seen, 0.0),
+            taken=taken[fresh],
+            command=command[fresh],
+            torque=known,
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Clock:
@@ -113,3 +167,22 @@ class Clock:
                 f"step of {in_ms(self.physics)} (simulation.physics_step_ms)"
             )
         return steps
+
+
+def _torque(link: Link, clock: Clock, duration: float, rng: np.random.Generator) -> Array:
+    """Instants of the spring torques that the drives know.
+
+    Torque that arrives at once and without end is held over a physics step: that of its middle is
+    late by as much as the link in the mean.
+    """
+    if clock.embedded:
+        looks = _multiples(clock.embedded, duration)
+        known = looks[np.maximum(link.held(link.arrivals(looks, rng), looks), 0)]
+    else:
+        looks = _multiples(clock.physics, duration)
+        known = np.minimum(link.sent(looks + 0.5 * clock.physics, rng), looks)
+    return np.maximum(known, 0.0)
+
+
+def _multiples(period: float, duration: float) -> Array:
+    return period * np.arange(int(duration / period * (1.0 + 1e-12) + 1e-9) + 1)

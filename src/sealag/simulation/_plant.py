@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sealag.actuation import Actuators, motors_of
+from sealag.actuation import Actuators
 from sealag.errors import InputError
 from sealag.kernels import keep
 from sealag.kernels.ledger import IMPACT
@@ -104,7 +104,7 @@ class Plant:
         )  # fmt: skip
         self.contacts, mounts = self.surroundings.contacts, self.surroundings.mounts
         self.time = 0.0
-        motors = motors_of(actuators, robot.damping)
+        motors = actuators.motors(robot.damping)
         parts = contact.Plant(robot.tree, mounts, motors, self.contacts)
         physics = plant.allocate_physics(parts, instant=not delayed_torque_feedback)
         self.now, self._next, self.held = physics.now, physics.following, physics.held
@@ -174,7 +174,7 @@ class Plant:
         Raises:
             InputError: The fastest link on its spring moves too far in a step.
         """
-        rate, joint = fastest_link(self.robot, self.actuators, self.now.q)
+        rate, joint = self.actuators.fastest_link(self.robot, self.now.q)
         if rate * self.step_length > _STABLE:
             raise InputError(
                 f"the physics step of {self.step_length * 1e3:g} ms is too long: the link of "
@@ -386,28 +386,3 @@ class Plant:
                     impulse=(x, y, z),
                 )
             )
-
-
-def fastest_link(robot: Robot, actuators: Actuators, q: Array) -> tuple[float, str]:
-    """Return how fast the fastest link follows its spring and dampers, and its joint.
-
-    The largest |λ| of M v̇ = -K δ - (D_s + joint damping) v with locked motors and feet in the air,
-    1/s: what decides how long a step may be.
-
-    Args:
-        robot: The robot.
-        actuators: Its springs and motors.
-        q: Configuration (nq,).
-    """
-    n = robot.n
-    mobility = np.linalg.inv(robot.mass_matrix(q))[-n:, -n:]
-    damping = actuators.spring_damping + robot.damping
-    root = np.sqrt(actuators.spring_stiffness)
-    O = np.zeros((n, n))
-    # State (√K δ, v): without damping the matrix is as well scaled as its eigenvalues.
-    A = np.block([[O, np.diag(root)], [-mobility * root, -mobility * damping]])
-    values, modes = np.linalg.eig(A)
-    fastest = int(np.abs(values).argmax())
-    rate, mode = float(np.abs(values[fastest])), np.abs(modes[:, fastest]) ** 2
-    taken = mode[:n] + damping * mode[n:] / rate  # energy that spring and dampers take
-    return rate, robot.joints[int(taken.argmax())]

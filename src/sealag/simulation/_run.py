@@ -2,6 +2,10 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from sealag.simulation._audit import Audit
 from sealag.simulation._delay_store import delay_store
@@ -92,3 +96,53 @@ class Run:
                 for name in part.__dataclass_fields__:
                     value = getattr(part, name)
                     release(*value.values() if isinstance(value, dict) else [value])
+
+    def summary(self, *, recording: Path) -> dict[str, Any]:
+        """Return what it comes to: the numbers of its JSON answer.
+
+        Args:
+            recording: The file that holds it.
+        """
+        books = self.audit
+        joint, central, delay = books.joint_side, books.controller_side, books.delay_side
+        return {
+            "outcome": self.outcome.value,
+            "message": self.message,
+            "duration_s": float(self.time[-1]),
+            "seed": self.seed,
+            "recording": str(recording),
+            "largest_joint_speed_rad_s": _largest_size(self.theta_dot),
+            "largest_spring_torque_nm": _largest_size(self.tau_sea),
+            "measurement_age_s": self.ages.measurement,
+            "command_age_s": self.ages.command,
+            "total_age_s": self.ages.total,
+            "energy_residual_j": _largest_size(books.residual),
+            "energy_throughput_j": float(books.throughput[-1]),
+            "joint_side_passive": joint.passive,
+            "controller_side_passive": central.passive if central else None,
+            "controller_side_slack_j": float(central.slack.min()) if central else None,
+            "first_violation_s": central.first_violation if central else None,
+            "violating_joint": central.joint if central else None,
+            "delay_side_passive": delay.passive if delay else None,
+            "delay_side_slack_j": float(delay.slack.min()) if delay else None,
+            "delay_injection_j": _largest(books.delay_injection),
+            "law_injection_j": _largest_magnitude(books.law_injection),
+            "injection_error_j": books.injection_error,
+            "delay_storage_j": _largest(books.delay_storage),
+            "delay_storage_error_j": books.delay_storage_error,
+            "tank_j": float(books.tank[-1]) if books.tank is not None else None,
+            "touchdowns": sum(event.kind.value == "touchdown" for event in self.events),
+        }
+
+
+def _largest(values: Array | None) -> float | None:
+    return None if values is None else float(values.max())
+
+
+def _largest_size(values: Array) -> float:
+    return max(float(values.max()), -float(values.min()))
+
+
+def _largest_magnitude(values: Array | None) -> float | None:
+    """The value that is furthest from 0, with its sign."""
+    return None if values is None else float(values[np.abs(values).argmax()])

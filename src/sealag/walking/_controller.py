@@ -1,7 +1,6 @@
 """The walking controller: whole-body law, weight transfer, steps and command at each tick."""
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,15 +12,15 @@ from sealag.robot import Robot
 from sealag.typing import Array
 from sealag.walking._estimator import Body, Estimator, biped_of
 from sealag.walking._feet import Side
+from sealag.walking._gait import WalkingGait
+from sealag.walking._ground import Ground
 from sealag.walking._options import (
     JointAngles,
     Prediction,
     WalkingOptions,
 )
 from sealag.walking._placement import Placement
-from sealag.walking._start import walking_start
 from sealag.walking._step import StepReferences
-from sealag.walking._walk import Walking
 from sealag.whole_body import Measurement
 
 if TYPE_CHECKING:
@@ -44,7 +43,10 @@ class WalkingController:
     Args:
         robot: Floating base, six actuated joints.
         actuators: Springs and motors as the controller believes them to be.
-        walking: Feet, gait, means and gains, and the ground as the controller believes it to be.
+        feet: Frames of the left and the right foot.
+        ground: The ground as the controller believes it to be.
+        gait: The plan.
+        options: Means and gains.
         period: Time between two ticks, s.
 
     Attributes:
@@ -58,9 +60,12 @@ class WalkingController:
         self,
         robot: Robot,
         actuators: Actuators,
-        walking: Walking,
         *,
-        period: float = 1e-3,
+        feet: tuple[str, str],
+        ground: Ground,
+        gait: WalkingGait,
+        options: WalkingOptions,
+        period: float,
     ) -> None:
         from sealag.kernels import walking_law
 
@@ -72,13 +77,11 @@ class WalkingController:
         if not (math.isfinite(period) and period > 0.0):
             raise InputError(f"the controller's period must be a time > 0 s, got {period}")
         self._kernel, self._robot, self._actuators = walking_law, robot, actuators
-        self._ground, self._period = walking.ground, period
-        self.gait, self.options = walking.gait, walking.options
-        self._body = Body(robot, walking.feet)
+        self._ground, self._period = ground, period
+        self.gait, self.options = gait, options
+        self._body = Body(robot, feet)
         gains, lead = _gains(self.options, period)
-        biped = biped_of(
-            robot, actuators, self._body, walking.feet, period=period, gains=gains, lead=lead
-        )
+        biped = biped_of(robot, actuators, self._body, feet, period=period, gains=gains, lead=lead)
         self._biped, self.tau_task, self._first = keep(biped), biped.tau, True
         self._tau_sea = biped.tau_sea
         self._estimator = Estimator(
@@ -224,47 +227,3 @@ def _gains(options: WalkingOptions, period: float) -> "tuple[Gains, Lead]":
         feedback=float(options.torque_feedback),
     )
     return gains, lead
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WalkStart:
-    """A walking controller and the state in which its walk begins.
-
-    Attributes:
-        controller: the controller.
-        q: configuration (nq,).
-        v: velocity (nv,).
-        theta: motor angles (n,) whose springs carry the first task torque, rad.
-        theta_dot: motor speeds (n,), those of the joints, rad/s.
-    """
-
-    controller: WalkingController
-    q: Array
-    v: Array
-    theta: Array
-    theta_dot: Array
-
-
-def begin_walk(
-    robot: Robot, actuators: Actuators, walking: Walking, *, period: float = 1e-3
-) -> WalkStart:
-    """Return a walking controller and the state in which its walk begins, on the right foot.
-
-    Args:
-        robot: Biped with a floating base and six joints.
-        actuators: Springs and motors as the controller believes them to be.
-        walking: What walks where, and how.
-        period: Time between two ticks, s.
-
-    Raises:
-        InputError: The robot is not such a biped, or its legs cannot take the posture.
-    """
-    controller = WalkingController(robot, actuators, walking, period=period)
-    q, v = walking_start(robot, walking)
-    return WalkStart(
-        controller=controller,
-        q=q,
-        v=v,
-        theta=controller.motor_start(q, v),
-        theta_dot=robot.joint_velocities(v),
-    )

@@ -5,14 +5,17 @@ Zhao, Sentis, Humanoids 2012; Zhao, Fernandez, Sentis, IJRR 2017.
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from sealag.constants import GRAVITY
 from sealag.errors import InputError
+from sealag.robot import Motion, Robot
 from sealag.typing import Array, ArrayLike
 from sealag.walking._feet import Side
 from sealag.walking._ground import Ground
+from sealag.walking._motion import Targets, follow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +77,72 @@ class WalkPlan:
     previous_foot: Array
     next_foot: Array
     ground: Ground
+
+    @classmethod
+    def over(
+        cls,
+        ground: Ground,
+        *,
+        steps: int = 7,
+        apex_speed: ArrayLike = 0.6,
+        step_length: ArrayLike = 0.45,
+        step_width: float = 0.2,
+        com_height: ArrayLike = 0.86,
+        first_side: Side = Side.RIGHT,
+    ) -> Self:
+        """Plan a walk: footholds on the ground, apexes over them, switches where phase curves meet.
+
+        Stances k and k + 1 switch where v_k² + ω_k²(x − x_k)² = v_{k+1}² + ω_{k+1}²(x − x_{k+1})².
+        The lateral foothold y_{k+1} = y_s + (ẏ_s / ω) coth(ω T) makes ẏ = 0 at the next apex.
+
+        Args:
+            ground: the ground.
+            steps: number of steps, at least 1.
+            apex_speed: forward speed over each foot, one number or steps + 1, m/s.
+            step_length: forward distance of footholds, one number or one for each step, m.
+            step_width: lateral distance of the first two footholds if the walk were even, m.
+            com_height: of the centre of mass above each foot at its apex, one number or steps + 1,
+                m.
+            first_side: which foot stands first.
+
+        Returns:
+            The plan, which begins at time 0 at the apex over the first foot, at x = y_foot = 0.
+
+        Raises:
+            InputError: a number is out of range, or a step is so short or long for its speeds that
+                its phase curves do not meet between the feet.
+        """
+        if steps < 1:
+            raise InputError(f"A walk needs at least one step, not {steps}.")
+        speeds = _numbers("apex_speed", apex_speed, steps + 1)
+        heights = _numbers("com_height", com_height, steps + 1)
+        lengths = _numbers("step_length", step_length, steps)
+        width = float(_numbers("step_width", step_width, 1)[0])
+        x = np.concatenate([[0.0], np.cumsum(lengths)])
+        omegas = np.sqrt(GRAVITY / heights)
+        after, before = _switches(x, speeds, omegas)
+        width *= first_side.other.lateral
+        y, offsets = _lateral(omegas, after, before, width=width)
+        feet = _on_ground(ground, x, y, lengths, width=width)
+        apexes = np.concatenate([[0.0], np.cumsum(after + before)])
+        starts = np.concatenate([[0.0], apexes[1:] - before])
+        ends = np.append(starts[1:], apexes[-1])
+        stances = tuple(
+            Stance(
+                side=first_side if k % 2 == 0 else first_side.other,
+                foot=feet[k + 1],
+                height=float(heights[k]),
+                slope=float((feet[k + 2][2] - feet[k][2]) / (feet[k + 2][0] - feet[k][0])),
+                omega=float(omegas[k]),
+                apex_time=float(apexes[k]),
+                apex_speed=float(speeds[k]),
+                apex_offset=float(offsets[k]),
+                start=float(starts[k]),
+                end=float(ends[k]),
+            )
+            for k in range(steps + 1)
+        )
+        return cls(stances=stances, previous_foot=feet[0], next_foot=feet[-1], ground=ground)
 
     @property
     def duration(self) -> float:
@@ -141,6 +210,55 @@ class WalkPlan:
         up = np.array([0.0, 0.0, lift])
         return place + bump * up, speed + bump_rate * up
 
+    def motion(
+        self,
+        robot: Robot,
+        *,
+        rate: float = 1000.0,
+        clearance: float = 0.06,
+        feet: tuple[str, str] = ("left_foot", "right_foot"),
+        base_frame: str = "torso",
+    ) -> Motion:
+        """Return the motion of a biped with three actuated joints a leg that walks so.
+
+        At each instant the stance foot stands on its foothold, the swing foot and the centre of
+        mass follow the plan and the base stays upright.
+
+        Args:
+            robot: a floating-base biped.
+            rate: instants per second.
+            clearance: of the swing foot, m.
+            feet: frames of the left and the right foot.
+            base_frame: the frame that stays upright.
+
+        Returns:
+            The motion; its contact sets are the stance foot alone.
+
+        Raises:
+            RobotError: a foothold is out of reach or a joint limit would be passed; the message
+                names step and instant.
+        """
+        time = np.arange(int(self.duration * rate) + 1) / rate
+        targets = [self._targets(t, clearance) for t in time]
+        return follow(
+            robot, time, targets, stances=len(self.stances), feet=feet, base_frame=base_frame
+        )
+
+    def _targets(self, t: float, clearance: float) -> Targets:
+        k = self.index(t)
+        com, com_rate = self.com(t)
+        swing, swing_rate = self.swing(t, clearance=clearance)
+        stance = self.stances[k]
+        return Targets(
+            stance=k,
+            side=stance.side,
+            stand=stance.foot,
+            com=com,
+            com_rate=com_rate,
+            swing=swing,
+            swing_rate=swing_rate,
+        )
+
     def _obstacle(self, begin: Array, end: Array) -> float:
         """How much the ground rises above the straight line between two footholds."""
         highest = 0.0
@@ -160,70 +278,6 @@ def _cubic(before: Stance, after: Stance, t: float) -> tuple[float, float]:
     v0, v1 = before.slope * before.apex_speed * T, after.slope * after.apex_speed * T
     a, b = 2 * z0 - 2 * z1 + v0 + v1, -3 * z0 + 3 * z1 - 2 * v0 - v1
     return ((a * u + b) * u + v0) * u + z0, ((3 * a * u + 2 * b) * u + v0) / T
-
-
-def plan_walk(
-    ground: Ground,
-    *,
-    steps: int = 7,
-    apex_speed: ArrayLike = 0.6,
-    step_length: ArrayLike = 0.45,
-    step_width: float = 0.2,
-    com_height: ArrayLike = 0.86,
-    first_side: Side = Side.RIGHT,
-) -> WalkPlan:
-    """Plan a walk: footholds on the ground, apexes over them, switches where phase curves meet.
-
-    Stances k and k + 1 switch where v_k² + ω_k²(x − x_k)² = v_{k+1}² + ω_{k+1}²(x − x_{k+1})².
-    The lateral foothold y_{k+1} = y_s + (ẏ_s / ω) coth(ω T) makes ẏ = 0 at the next apex.
-
-    Args:
-        ground: the ground.
-        steps: number of steps, at least 1.
-        apex_speed: forward speed over each foot, one number or steps + 1, m/s.
-        step_length: forward distance of footholds, one number or one for each step, m.
-        step_width: lateral distance of the first two footholds if the walk were even, m.
-        com_height: of the centre of mass above each foot at its apex, one number or steps + 1, m.
-        first_side: which foot stands first.
-
-    Returns:
-        The plan, which begins at time 0 at the apex over the first foot, at x = y_foot = 0.
-
-    Raises:
-        InputError: a number is out of range, or a step is so short or long for its speeds that
-            its phase curves do not meet between the feet.
-    """
-    if steps < 1:
-        raise InputError(f"A walk needs at least one step, not {steps}.")
-    speeds = _numbers("apex_speed", apex_speed, steps + 1)
-    heights = _numbers("com_height", com_height, steps + 1)
-    lengths = _numbers("step_length", step_length, steps)
-    width = float(_numbers("step_width", step_width, 1)[0])
-    x = np.concatenate([[0.0], np.cumsum(lengths)])
-    omegas = np.sqrt(GRAVITY / heights)
-    after, before = _switches(x, speeds, omegas)
-    width *= first_side.other.lateral
-    y, offsets = _lateral(omegas, after, before, width=width)
-    feet = _on_ground(ground, x, y, lengths, width=width)
-    apexes = np.concatenate([[0.0], np.cumsum(after + before)])
-    starts = np.concatenate([[0.0], apexes[1:] - before])
-    ends = np.append(starts[1:], apexes[-1])
-    stances = tuple(
-        Stance(
-            side=first_side if k % 2 == 0 else first_side.other,
-            foot=feet[k + 1],
-            height=float(heights[k]),
-            slope=float((feet[k + 2][2] - feet[k][2]) / (feet[k + 2][0] - feet[k][0])),
-            omega=float(omegas[k]),
-            apex_time=float(apexes[k]),
-            apex_speed=float(speeds[k]),
-            apex_offset=float(offsets[k]),
-            start=float(starts[k]),
-            end=float(ends[k]),
-        )
-        for k in range(steps + 1)
-    )
-    return WalkPlan(stances=stances, previous_foot=feet[0], next_foot=feet[-1], ground=ground)
 
 
 def _numbers(name: str, values: ArrayLike, count: int) -> Array:

@@ -8,13 +8,19 @@ from sealag.errors import InputError
 from sealag.robot import Robot, Workspace
 from sealag.typing import Array
 from sealag.walking._feet import Side
-from sealag.walking._walk import Walking
+from sealag.walking._gait import WalkingGait
+from sealag.walking._ground import Ground
 
 _SWING_SPEED = 1.6  # mid-swing speed of the foot in mean speeds of its swing
 
 
 def walking_start(
-    robot: Robot, walking: Walking, *, stance: Side = Side.RIGHT
+    robot: Robot,
+    *,
+    feet: tuple[str, str],
+    ground: Ground,
+    gait: WalkingGait,
+    stance: Side = Side.RIGHT,
 ) -> tuple[Array, Array]:
     """Return configuration (nq,) and velocity (nv,) at the apex of a gait.
 
@@ -23,16 +29,17 @@ def walking_start(
 
     Args:
         robot: Biped with a floating base and six joints.
-        walking: Feet, ground and gait.
+        feet: Frames of the left and the right foot.
+        ground: Where they stand.
+        gait: The gait.
         stance: Foot stood on.
 
     Raises:
         InputError: The legs cannot take this posture.
     """
-    gait, feet = walking.gait, walking.feet
     plan, side = gait.periodic(), stance.other.lateral
     place = np.array([0.0, -side * plan.apex_outward])
-    level = walking.ground.height(*place)
+    level = ground.height(*place)
     stand = np.array([*place, level + gait.foot_radius])
     swing = stand + np.array([0.0, side * gait.step_width, gait.clearance])
     com = np.array([0.0, 0.0, level + gait.com_height])

@@ -1,10 +1,11 @@
 """The frozen closed loop at one configuration: one law and one plant, contacts eliminated."""
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
-from sealag.actuation import Actuators, motors_of
+from sealag.actuation import Actuators
 from sealag.robot import Contact, Robot
 from sealag.typing import Array
 from sealag.whole_body._evaluation import LawEvaluation
@@ -20,151 +21,6 @@ differences leave 1e-9 where it feels none; a task that feels one feels it with 
 _KNOWN = 1e-9
 """Share of the law's and the links' stiffness that central differences leave open: a motion that is
 held by less is held by nothing."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FrozenLoop:
-    """ẋ = A_0 x + B C x(t − d) + A_e x(t − e) about a rest, x = [z, θ, ż, θ̇, τ_m, ξ].
-
-    z are coordinates along the motions that contacts leave free, δq = Z z, without conserved
-    momentum that the law feels; τ_m motor torques of drives with a bandwidth; ξ the law's memory.
-
-    Attributes:
-        A_0: (N, N) what acts without delay: links, springs, drives, damping.
-        B: (N, n) what a command τ_osc does, late by d.
-        C: (n, N) the command δτ_osc of a state.
-        A_e: (N, N) torque feedback of the drives, late by e; 0 if the design does not delay it.
-        embedded_delay: e, s.
-        states: names of the states.
-        symmetries: (N, s) states along which nothing acts, because gravity, contacts and the law do
-            not change: yaw about a point foot, translation of a free robot, unless a task feels it.
-        bend: share of the law's derivative that changes within the distance asked for, `beside`.
-    """
-
-    A_0: Array
-    B: Array
-    C: Array
-    A_e: Array
-    embedded_delay: float
-    states: tuple[str, ...]
-    symmetries: Array
-    bend: float = 0.0
-
-    @property
-    def A_1(self) -> Array:
-        """(N, N) the law's part, late by d."""
-        return self.B @ self.C
-
-    @classmethod
-    def of(
-        cls,
-        robot: Robot,
-        law: Law,
-        actuators: Actuators,
-        posture: Array,
-        *,
-        contacts: tuple[Contact, ...],
-        rest: Rest,
-        embedded_delay: float | None = None,
-        beside: float | None = None,
-    ) -> "FrozenLoop":
-        """Freeze the closed loop of the law that runs, where it rests.
-
-        Links: Zᵀ M Z z̈ + Zᵀ D_j Z ż + H z = Sᵀ τ_sea with S = U Z,
-        τ_sea = K (θ − S z) + D_s (θ̇ − S ż), D_j the joints' own damping, and H as in
-        `LinkPlant.free`. Motors and drives: the rates of the kernel that simulates them. The
-        command: the derivative of what the controller ticks.
-
-        Args:
-            robot: the robot.
-            law: the law.
-            actuators: springs, motors and drives.
-            posture: (nq,) configuration that the law holds.
-            contacts: which frames are held.
-            rest: where the loop rests, from `Rest.of`.
-            embedded_delay: how late torque feedback is in the drives, s; None for without delay.
-            beside: also differentiate the law over this distance, rad, and say in `bend` what
-                changes: in a singular posture a law may have no derivative that holds beside it.
-
-        Returns:
-            The frozen loop.
-
-        Raises:
-            ContractionError: q̄(θ) is fed back and does not exist.
-        """
-        evaluation = LawEvaluation(
-            robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
-        )
-        signal = law.signal.start(evaluation, delay_bound=0.0)
-        command = signal.derivative(rest.q, rest.theta)
-        bend = 0.0
-        if beside is not None:
-            bend = command.change(signal.derivative(rest.q, rest.theta, beside))
-        loop = cls.with_derivative(
-            robot,
-            command,
-            actuators,
-            contacts=contacts,
-            rest=rest,
-            embedded_delay=embedded_delay,
-        )
-        return replace(loop, bend=bend)
-
-    @classmethod
-    def with_derivative(
-        cls,
-        robot: Robot,
-        command: LawDerivative,
-        actuators: Actuators,
-        *,
-        contacts: tuple[Contact, ...],
-        rest: Rest,
-        embedded_delay: float | None = None,
-        C_v: Array | None = None,
-        C_theta_dot: Array | None = None,
-    ) -> "FrozenLoop":
-        """Close the loop of links, motors and drives with the derivative of any law.
-
-        Args:
-            robot: the robot.
-            command: the law's derivative at rest.
-            actuators: springs, motors and drives.
-            contacts: which frames are held.
-            rest: where the loop rests.
-            embedded_delay: how late torque feedback is in the drives, s; None for without delay.
-            C_v: (n, nv) command of tangent velocities, Nms/rad; None for none.
-            C_theta_dot: (n, n) command of motor velocities, Nms/rad; None for none.
-
-        Returns:
-            The frozen loop.
-        """
-        links = LinkPlant(robot, contacts).free(rest.q, rest.tau_sea)
-        links, kept, C_z, B_z = _without_momentum(links, command)
-        memory = Memory(
-            A=command.A, B_z=B_z, B_theta=command.B_theta, B_rate=command.B_rate, C=command.C
-        )
-        S = links.Z[robot.nv_base :]
-        H, C_z, C_theta = _without_noise(
-            links.H, S, actuators.spring_stiffness, C_z=C_z, C_theta=command.C_theta, memory=memory
-        )
-        loop = sea_loop(
-            actuators,
-            M=links.M,
-            H=H,
-            S=S,
-            joint_damping=robot.damping,
-            C_z=C_z,
-            C_theta=C_theta,
-            memory=memory,
-            symmetries=kept,
-            embedded_delay=embedded_delay,
-        )
-        C, at = loop.C.copy(), _Places(links.Z.shape[1], robot.n, drives=0, memory_size=0)
-        if C_v is not None:
-            C[:, at.z_rate] += C_v @ links.Z
-        if C_theta_dot is not None:
-            C[:, at.theta_rate] += C_theta_dot
-        return replace(loop, C=C)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,72 +93,237 @@ class Memory:
     C: Array
 
 
-def sea_loop(
-    actuators: Actuators,
-    *,
-    M: Array,
-    H: Array,
-    S: Array,
-    C_z: Array,
-    C_theta: Array,
-    joint_damping: Array | float = 0.0,
-    memory: Memory | None = None,
-    symmetries: Array | None = None,
-    embedded_delay: float | None = None,
-) -> FrozenLoop:
-    """Build the loop of links, springs, motors, drives and a late linear command.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrozenLoop:
+    """ẋ = A_0 x + B C x(t − d) + A_e x(t − e) about a rest, x = [z, θ, ż, θ̇, τ_m, ξ].
 
-    M z̈ + Sᵀ D_j S ż + H z = Sᵀ τ_sea, τ_sea = K (θ − S z) + D_s (θ̇ − S ż), motors and drives as in
-    the kernel that simulates them, δτ_osc = C_z z + C_theta θ + C ξ late by d.
+    z are coordinates along the motions that contacts leave free, δq = Z z, without conserved
+    momentum that the law feels; τ_m motor torques of drives with a bandwidth; ξ the law's memory.
 
-    Args:
-        actuators: springs, motors and drives of n joints.
-        M: (k, k) inertia of the links, kg m².
-        H: (k, k) their stiffness, Nm/rad.
-        S: (n, k) joint angles of z.
-        C_z: (n, k) command of z, Nm/rad.
-        C_theta: (n, n) command of θ, Nm/rad.
-        joint_damping: (n,) or one number, D_j, Nms/rad.
-        memory: what the law remembers; None for nothing.
-        symmetries: (k, s) z along which nothing acts.
-        embedded_delay: e, how late torque feedback is in the drives, s; None for without delay.
+    Attributes:
+        A_0: (N, N) what acts without delay: links, springs, drives, damping.
+        B: (N, n) what a command τ_osc does, late by d.
+        C: (n, N) the command δτ_osc of a state.
+        A_e: (N, N) torque feedback of the drives, late by e; 0 if the design does not delay it.
+        embedded_delay: e, s.
+        states: names of the states.
+        symmetries: (N, s) states along which nothing acts, because gravity, contacts and the law do
+            not change: yaw about a point foot, translation of a free robot, unless a task feels it.
+        bend: share of the law's derivative that changes within the distance asked for, `beside`.
     """
-    n, k = S.shape
-    drives = np.flatnonzero(np.isfinite(actuators.torque_bandwidth))
-    at = _Places(k, n, len(drives), 0 if memory is None else len(memory.A))
-    one = np.eye(n)
-    angle, rate = at.take(at.theta, one), at.take(at.theta_rate, one)
-    link, link_rate = at.take(at.z, S), at.take(at.z_rate, S)
-    torque = np.zeros((n, at.size))
-    torque[drives, np.arange(at.size)[at.torque]] = 1.0
-    spring = actuators.spring_stiffness[:, None] * (angle - link)
-    spring += actuators.spring_damping[:, None] * (rate - link_rate)
-    drag = np.broadcast_to(joint_damping, n)[:, None] * link_rate
-    rows = _motor_rows(actuators, instant=embedded_delay is None)
-    moved = np.stack([angle, rate, torque, link, link_rate])
-    A_0, B = np.zeros((at.size, at.size)), np.zeros((at.size, n))
-    A_0[at.z, at.z_rate], A_0[at.theta, at.theta_rate] = np.eye(k), one
-    A_0[at.z_rate] = np.linalg.solve(M, S.T @ (spring - drag) - at.take(at.z, H))
-    A_0[at.theta_rate] = np.einsum("pi,pij->ij", rows.speed, moved)
-    A_0[at.torque] = np.einsum("pi,pij->ij", rows.torque, moved)[drives]
-    B[at.theta_rate] = np.diag(rows.speed_command)
-    B[at.torque] = np.diag(rows.torque_command)[drives]
-    C = at.take(at.z, C_z) + at.take(at.theta, C_theta)
-    if memory is not None:
-        C[:, at.memory] = memory.C
-        A_0[at.memory, at.memory], A_0[at.memory, at.z] = memory.A, memory.B_z
-        A_0[at.memory, at.theta] = memory.B_theta
-        A_0[at.memory, at.theta_rate] = memory.B_rate
-    kept = np.zeros((k, 0)) if symmetries is None else symmetries
-    return FrozenLoop(
-        A_0=A_0,
-        B=B,
-        C=C,
-        A_e=np.zeros_like(A_0) if embedded_delay is None else B @ (rows.shift[:, None] * spring),
-        embedded_delay=embedded_delay or 0.0,
-        states=at.names(actuators.joints, drives),
-        symmetries=at.take(at.z, kept.T).T,
-    )
+
+    A_0: Array
+    B: Array
+    C: Array
+    A_e: Array
+    embedded_delay: float
+    states: tuple[str, ...]
+    symmetries: Array
+    bend: float = 0.0
+
+    @property
+    def A_1(self) -> Array:
+        """(N, N) the law's part, late by d."""
+        return self.B @ self.C
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        law: Law,
+        actuators: Actuators,
+        posture: Array,
+        *,
+        contacts: tuple[Contact, ...],
+        rest: Rest,
+        embedded_delay: float | None = None,
+        beside: float | None = None,
+    ) -> Self:
+        """Freeze the closed loop of the law that runs, where it rests.
+
+        Links: Zᵀ M Z z̈ + Zᵀ D_j Z ż + H z = Sᵀ τ_sea with S = U Z,
+        τ_sea = K (θ − S z) + D_s (θ̇ − S ż), D_j the joints' own damping, and H as in
+        `free_links`. Motors and drives: the rates of the kernel that simulates them. The
+        command: the derivative of what the controller ticks.
+
+        Args:
+            robot: the robot.
+            law: the law.
+            actuators: springs, motors and drives.
+            posture: (nq,) configuration that the law holds.
+            contacts: which frames are held.
+            rest: where the loop rests, from `Rest.of`.
+            embedded_delay: how late torque feedback is in the drives, s; None for without delay.
+            beside: also differentiate the law over this distance, rad, and say in `bend` what
+                changes: in a singular posture a law may have no derivative that holds beside it.
+
+        Returns:
+            The frozen loop.
+
+        Raises:
+            ContractionError: q̄(θ) is fed back and does not exist.
+        """
+        evaluation = LawEvaluation(
+            robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
+        )
+        signal = law.signal.start(evaluation, delay_bound=0.0)
+        command = signal.derivative(rest.q, rest.theta)
+        bend = 0.0
+        if beside is not None:
+            bend = command.change(signal.derivative(rest.q, rest.theta, beside))
+        loop = cls.with_derivative(
+            robot,
+            command,
+            actuators,
+            contacts=contacts,
+            rest=rest,
+            embedded_delay=embedded_delay,
+        )
+        return replace(loop, bend=bend)
+
+    @classmethod
+    def with_derivative(
+        cls,
+        robot: Robot,
+        command: LawDerivative,
+        actuators: Actuators,
+        *,
+        contacts: tuple[Contact, ...],
+        rest: Rest,
+        embedded_delay: float | None = None,
+        C_v: Array | None = None,
+        C_theta_dot: Array | None = None,
+    ) -> Self:
+        """Close the loop of links, motors and drives with the derivative of any law.
+
+        Args:
+            robot: the robot.
+            command: the law's derivative at rest.
+            actuators: springs, motors and drives.
+            contacts: which frames are held.
+            rest: where the loop rests.
+            embedded_delay: how late torque feedback is in the drives, s; None for without delay.
+            C_v: (n, nv) command of tangent velocities, Nms/rad; None for none.
+            C_theta_dot: (n, n) command of motor velocities, Nms/rad; None for none.
+
+        Returns:
+            The frozen loop.
+        """
+        links = cls.free_links(robot, rest.q, rest.tau_sea, contacts=contacts)
+        links, kept, C_z, B_z = _without_momentum(links, command)
+        memory = Memory(
+            A=command.A, B_z=B_z, B_theta=command.B_theta, B_rate=command.B_rate, C=command.C
+        )
+        S = links.Z[robot.nv_base :]
+        H, C_z, C_theta = _without_noise(
+            links.H, S, actuators.spring_stiffness, C_z=C_z, C_theta=command.C_theta, memory=memory
+        )
+        loop = cls.of_links(
+            actuators,
+            M=links.M,
+            H=H,
+            S=S,
+            joint_damping=robot.damping,
+            C_z=C_z,
+            C_theta=C_theta,
+            memory=memory,
+            symmetries=kept,
+            embedded_delay=embedded_delay,
+        )
+        C, at = loop.C.copy(), _Places(links.Z.shape[1], robot.n, drives=0, memory_size=0)
+        if C_v is not None:
+            C[:, at.z_rate] += C_v @ links.Z
+        if C_theta_dot is not None:
+            C[:, at.theta_rate] += C_theta_dot
+        return replace(loop, C=C)
+
+    @classmethod
+    def of_links(
+        cls,
+        actuators: Actuators,
+        *,
+        M: Array,
+        H: Array,
+        S: Array,
+        C_z: Array,
+        C_theta: Array,
+        joint_damping: Array | float = 0.0,
+        memory: Memory | None = None,
+        symmetries: Array | None = None,
+        embedded_delay: float | None = None,
+    ) -> Self:
+        """Build the loop of links, springs, motors, drives and a late linear command.
+
+        M z̈ + Sᵀ D_j S ż + H z = Sᵀ τ_sea, τ_sea = K (θ − S z) + D_s (θ̇ − S ż), motors and drives
+        as in the kernel that simulates them, δτ_osc = C_z z + C_theta θ + C ξ late by d.
+
+        Args:
+            actuators: springs, motors and drives of n joints.
+            M: (k, k) inertia of the links, kg m².
+            H: (k, k) their stiffness, Nm/rad.
+            S: (n, k) joint angles of z.
+            C_z: (n, k) command of z, Nm/rad.
+            C_theta: (n, n) command of θ, Nm/rad.
+            joint_damping: (n,) or one number, D_j, Nms/rad.
+            memory: what the law remembers; None for nothing.
+            symmetries: (k, s) z along which nothing acts.
+            embedded_delay: e, how late torque feedback is in the drives, s; None for without delay.
+        """
+        n, k = S.shape
+        drives = np.flatnonzero(np.isfinite(actuators.torque_bandwidth))
+        at = _Places(k, n, len(drives), 0 if memory is None else len(memory.A))
+        one = np.eye(n)
+        angle, rate = at.take(at.theta, one), at.take(at.theta_rate, one)
+        link, link_rate = at.take(at.z, S), at.take(at.z_rate, S)
+        torque = np.zeros((n, at.size))
+        torque[drives, np.arange(at.size)[at.torque]] = 1.0
+        spring = actuators.spring_stiffness[:, None] * (angle - link)
+        spring += actuators.spring_damping[:, None] * (rate - link_rate)
+        drag = np.broadcast_to(joint_damping, n)[:, None] * link_rate
+        rows = _motor_rows(actuators, instant=embedded_delay is None)
+        moved = np.stack([angle, rate, torque, link, link_rate])
+        A_0, B = np.zeros((at.size, at.size)), np.zeros((at.size, n))
+        A_0[at.z, at.z_rate], A_0[at.theta, at.theta_rate] = np.eye(k), one
+        A_0[at.z_rate] = np.linalg.solve(M, S.T @ (spring - drag) - at.take(at.z, H))
+        A_0[at.theta_rate] = np.einsum("pi,pij->ij", rows.speed, moved)
+        A_0[at.torque] = np.einsum("pi,pij->ij", rows.torque, moved)[drives]
+        B[at.theta_rate] = np.diag(rows.speed_command)
+        B[at.torque] = np.diag(rows.torque_command)[drives]
+        C = at.take(at.z, C_z) + at.take(at.theta, C_theta)
+        if memory is not None:
+            C[:, at.memory] = memory.C
+            A_0[at.memory, at.memory], A_0[at.memory, at.z] = memory.A, memory.B_z
+            A_0[at.memory, at.theta] = memory.B_theta
+            A_0[at.memory, at.theta_rate] = memory.B_rate
+        late = embedded_delay is not None
+        A_e = B @ (rows.shift[:, None] * spring) if late else np.zeros_like(A_0)
+        kept = np.zeros((k, 0)) if symmetries is None else symmetries
+        return cls(
+            A_0=A_0,
+            B=B,
+            C=C,
+            A_e=A_e,
+            embedded_delay=embedded_delay or 0.0,
+            states=at.names(actuators.joints, drives),
+            symmetries=at.take(at.z, kept.T).T,
+        )
+
+    @staticmethod
+    def free_links(
+        robot: Robot, q: Array, springs: Array, *, contacts: tuple[Contact, ...]
+    ) -> FreeLinks:
+        """Return inertia and stiffness of the links along what contacts leave free.
+
+        Along rigid motions that change no height, gravity and contacts do not change, so that the
+        stiffness is 0 there, also away from an equilibrium.
+
+        Args:
+            robot: the robot.
+            q: (nq,) configuration at rest.
+            springs: (n,) torque of the springs, Nm.
+            contacts: which frames are held.
+        """
+        return LinkPlant(robot, contacts).free(q, springs)
 
 
 def _without_momentum(
@@ -376,7 +397,7 @@ def _motor_rows(actuators: Actuators, *, instant: bool) -> _MotorRows:
     from sealag.kernels.motor import rate_rows
 
     speed, torque = np.zeros((2, 6, actuators.n))
-    rate_rows(tuple(motors_of(actuators)), instant, speed, torque)
+    rate_rows(tuple(actuators.motors()), instant, speed, torque)
     ratio = actuators.rotor_inertia / actuators.shaped_inertia
     return _MotorRows(
         speed=speed[:5],

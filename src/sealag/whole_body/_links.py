@@ -47,7 +47,7 @@ class LinkPlant:
             robot: the robot.
             contacts: which frames are held.
         """
-        self._robot, self._contacts, self._at = robot, contacts, robot.workspace()
+        self._robot, self._contacts = robot, contacts
 
     def jacobian(self, q: Array) -> Array:
         """Return J_s (c, nv).
@@ -106,20 +106,20 @@ class LinkPlant:
             springs: (n,) torque of the springs, Nm.
             directions: (nv, p) tangent motions.
         """
-        force, rest = self._force(q, springs), np.zeros(self._robot.nv)
+        force = self._force(q, springs)
         out = np.empty((self._robot.nv, directions.shape[1]))
         for i, way in enumerate(directions.T):
-            out[:, i] = self._load(self._robot.integrate(q, _STEP * way), rest, force)
-            out[:, i] -= self._load(self._robot.integrate(q, -_STEP * way), rest, force)
+            out[:, i] = self._load(self._robot.integrate(q, _STEP * way), force)
+            out[:, i] -= self._load(self._robot.integrate(q, -_STEP * way), force)
         return out / (2.0 * _STEP)
 
-    def _load(self, q: Array, rest: Array, force: Array) -> Array:
+    def _load(self, q: Array, force: Array) -> Array:
         """g − J_sᵀ λ (nv,)."""
-        self._at.update(q, rest)
-        out, first = self._at.nle.copy(), 0
+        at = self._robot.workspace_at(q)
+        out, first = at.nle.copy(), 0
         for contact in self._contacts:
             last = first + contact.kind.rows
-            out -= self._at.frame_jacobian(contact.frame)[: last - first].T @ force[first:last]
+            out -= at.frame_jacobian(contact.frame)[: last - first].T @ force[first:last]
             first = last
         return out
 

@@ -5,7 +5,7 @@ certified and simulated is what runs.
 """
 
 from dataclasses import dataclass
-from typing import Protocol, Self, runtime_checkable
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -89,7 +89,11 @@ class Measurement:
 
 
 class TickController(Protocol):
-    """A controller that is called once per period of the central loop."""
+    """A controller that is called once per period of the central loop.
+
+    One that also has `storage`, as `Controller.storage`, states the potential that it stores, which
+    the passivity observer needs; one that has `tank_energy`, J, states what its tank holds.
+    """
 
     def reset(self, t: float, measurement: Measurement) -> None:
         """Forget the past and prepare for a run that begins in this state.
@@ -109,31 +113,4 @@ class TickController(Protocol):
                 the next call. ``t - measurement.time`` is its age.
             out: Where the command (n,) is written, Nm.
         """
-        ...
-
-
-@runtime_checkable
-class StoringController(Protocol):
-    """A controller that can state the potential it stores, for the passivity observer."""
-
-    def storage(self, t: float, measurement: Measurement, command: Array) -> float:
-        """Return V_3 (and the tank's energy, where there is one) in J.
-
-        The potential whose negative gradient in theta is the undelayed command, up to a constant.
-
-        Args:
-            t: Instant at which the references of the law are taken, s.
-            measurement: The true state at that instant, not delayed.
-            command: Where the undelayed command (n,) is written, Nm.
-        """
-        ...
-
-
-@runtime_checkable
-class TankController(Protocol):
-    """A controller whose energy tank pays for what its law does besides its potential."""
-
-    @property
-    def tank_energy(self) -> float:
-        """Return the energy left in the tank, J; 0 if the law has none."""
         ...

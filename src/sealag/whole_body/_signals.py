@@ -51,6 +51,26 @@ class Signal(ABC):
     has_potential: ClassVar[bool] = True
     rests_at_posture: ClassVar[bool] = False
 
+    @staticmethod
+    def names() -> tuple[str, ...]:
+        """Return the signals' words in project files and certificates."""
+        return tuple(kind.name for kind in _SIGNALS)
+
+    @staticmethod
+    def named(name: str) -> "Signal":
+        """Return a signal with its default settings.
+
+        Args:
+            name: one of `names`.
+
+        Raises:
+            UnknownNameError: there is none of this name.
+        """
+        for kind in _SIGNALS:
+            if kind.name == name:
+                return kind()
+        raise UnknownNameError(f"No signal is called {name!r}; there is {either(Signal.names())}.")
+
     def motor_stiffness(self, F_q: Array, K: Array) -> Array:
         """Return F_θ = −∂τ_osc/∂θ, (…, n, n) Nm/rad; F_q where the angles move with the motors.
 
@@ -213,23 +233,6 @@ class Tank(Signal):
 
 
 _SIGNALS = (MotorAngles, LinkAngles, StaticJoint, Tank)
-SIGNAL_NAMES: tuple[str, ...] = tuple(kind.name for kind in _SIGNALS)
-"""The signals' words in project files and certificates."""
-
-
-def signal_named(name: str) -> Signal:
-    """Return a signal with its default settings.
-
-    Args:
-        name: one of SIGNAL_NAMES.
-
-    Raises:
-        UnknownNameError: there is none of this name.
-    """
-    for kind in _SIGNALS:
-        if kind.name == name:
-            return kind()
-    raise UnknownNameError(f"No signal is called {name!r}; there is {either(SIGNAL_NAMES)}.")
 
 
 def static_contraction(F_q: Array, K: Array) -> Array:

@@ -96,6 +96,17 @@ class Spaces:
         rows = slice(self.levels[index], self.levels[index + 1])
         return self.J_star[:, rows], self.Lambda[:, rows, rows], self.K_x[rows, rows]
 
+    @staticmethod
+    def relative_asymmetry(F: Array) -> Array:
+        """Return ‖F − Fᵀ‖ / ‖F + Fᵀ‖ (Frobenius), 0 for F = 0.
+
+        Args:
+            F: (…, n, n).
+        """
+        skew = np.linalg.norm(F - np.swapaxes(F, -1, -2), axis=(-2, -1))
+        even = np.linalg.norm(F + np.swapaxes(F, -1, -2), axis=(-2, -1))
+        return np.divide(skew, even, out=np.where(skew == 0.0, 0.0, np.inf), where=even > 0.0)
+
     @classmethod
     def along(cls, robot: Robot, law: Law, actuators: Actuators, motion: Motion) -> "Spaces":
         """Evaluate the law's matrices at every instant of a motion.
@@ -149,21 +160,10 @@ class Spaces:
             F_q=F_q,
             F_theta=F_theta,
             contraction=static_contraction(F_q, K),
-            asymmetry=relative_asymmetry(F_theta),
+            asymmetry=Spaces.relative_asymmetry(F_theta),
             gravity=torque,
             singular=singular,
         )
-
-
-def relative_asymmetry(F: Array) -> Array:
-    """Return ‖F − Fᵀ‖ / ‖F + Fᵀ‖ (Frobenius), 0 for F = 0.
-
-    Args:
-        F: (…, n, n).
-    """
-    skew = np.linalg.norm(F - np.swapaxes(F, -1, -2), axis=(-2, -1))
-    even = np.linalg.norm(F + np.swapaxes(F, -1, -2), axis=(-2, -1))
-    return np.divide(skew, even, out=np.where(skew == 0.0, 0.0, np.inf), where=even > 0.0)
 
 
 class _SpacesAt(NamedTuple):

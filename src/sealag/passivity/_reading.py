@@ -1,16 +1,22 @@
-"""Reading a certificate strictly, and checking it from the numbers in its file alone."""
+"""Reading a certificate strictly: layout, types and sizes, none of its claims."""
 
+import hashlib
+import json
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from sealag.errors import CertificateError
 from sealag.files import read_whole
-from sealag.passivity._certificate import SCHEMA, Certificate, content_digest
-from sealag.passivity._checks import Check, Verification
+from sealag.passivity._checks import Check
 from sealag.passivity._kinds import Criterion
 from sealag.passivity._layout import LARGEST_BYTES, decoded, plain
+from sealag.passivity._stated import Stated
+
+T = TypeVar("T", bound=Stated)
+
+SCHEMA = "sealag-certificate/4"
 
 MOST_AXES = 8
 """Of a window; each doubles the vertices to check."""
@@ -19,79 +25,21 @@ MOST_VERTICES = 200_000
 """Of all windows together; ten times more take an hour of rational arithmetic."""
 
 
-def verify(certificate: Path | str | Mapping[str, Any], *, exact: bool = False) -> Verification:
-    """Check every inequality and every claim of a certificate from its own numbers.
-
-    Keys that are unknown, missing or there twice, other types, numbers that are not finite, and
-    lists that do not fit each other are errors, not failed checks.
-
-    Proven, in floating point with a rounding bound or, if `exact`, in rational arithmetic:
-
-    - each instant in `proofs`: S is symmetric positive semidefinite, F follows from J*, S, K and
-      the gravity gradient, F is symmetric, q̄(θ) contracts where it is fed back (these for criterion
-      `certified`), and the matrix inequality of `InstantProof` holds at its delay, (29) or (31);
-    - no delay above `max_delay_upper_s` satisfies the criterion at the worst instant;
-    - the common multiplier at the instants in `proofs`, among them those that bind it;
-    - the time-varying multiplier in every window, at all vertices with the ball around them.
-
-    Computed anew in floating point, whether or not `exact`: the supremum of the criterion at the
-    worst instant, the motion that reaches it and the limiting direction; that the windows hold the
-    instants in `proofs`; unstable modes, margin and first crossing from the frozen loop of the
-    critical instant: jω is a root there, and discs around all eigenvalues exclude a shorter delay
-    (where a mode is unstable, or an embedded delay is in the loop, roots are counted at four
-    shorter delays instead). Status, smallest bound and margin, stability, conservatism and all that
-    follows from other keys are compared with what follows, and no digit of the file differs from
-    what was written.
-
-    Stated, not proven, as far as the file's other numbers do not contradict it: that the numbers
-    are the robot's and the design's (`hashes`, `joints`, `delay_s`, `time_s`, `feedback`,
-    `gravity`, `stiffness_form`, `task_inertia`, `levels`, `spring_damping`, `viscous_friction`,
-    `motor_inertia`, `rotor_inertia`, `torque_bandwidth`, the link side of `local_loop`,
-    `equilibrium`); what is said of instants without a proof (`bounds_s`, `asymmetry`,
-    `contraction`) and of others than the critical one (`instant_margins_s`, `instant_basis`);
-    `published_max_delay_s` of a `certified` certificate; and the words of `reasons`, `left_open`,
-    `assumptions` and `versions`. `sealag.design.verify_design` checks these against project, URDF
-    and motion.
+def plain_of(source: Path | str | Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the plain data, and numbers of the file whose digits are not those of their double.
 
     Args:
-        certificate: a file, or the plain data in it.
-        exact: decide definiteness in rational arithmetic instead of floating point with a
-            rounding margin.
-
-    Returns:
-        All checks; `valid` only if each holds.
-
-    Raises:
-        FileError: the file cannot be read.
-        CertificateError: it is not a certificate, or its arrays do not fit each other.
-    """
-    data, odd = _plain(certificate)
-    found = _typed(data, certificate)
-    first = _content_check(data, found, odd)
-    checks = (first, *found.checks(exact=exact))
-    return Verification(status=found.answer.status, exact=exact, checks=checks)
-
-
-def read_certificate(certificate: Path | str | Mapping[str, Any]) -> Certificate:
-    """Read a certificate, checking layout, types and sizes, but none of its claims.
-
-    Args:
-        certificate: a file, or the plain data in it.
+        source: a file, or the plain data in it.
 
     Raises:
         FileError: it cannot be read, or is larger than 100 MB.
-        CertificateError: it is not a certificate of this layout; the message names the key.
+        CertificateError: it is no file, or not JSON.
     """
-    return _typed(_plain(certificate)[0], certificate)
-
-
-def _plain(source: Path | str | Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """The plain data, and numbers of the file whose digits are not those of their double."""
     if isinstance(source, Mapping):
         return dict(source), ()
     if not isinstance(source, Path | str):
         raise CertificateError(
-            f"A {type(source).__name__} is no file of a certificate: `write_certificate` writes "
+            f"A {type(source).__name__} is no file of a certificate: `Certificate.write` writes "
             "one; a Certificate checks itself with `checks`."
         )
     content = read_whole(Path(source), what="The certificate", largest=LARGEST_BYTES)
@@ -101,8 +49,14 @@ def _plain(source: Path | str | Mapping[str, Any]) -> tuple[dict[str, Any], tupl
         raise CertificateError(f"{source} is not a certificate: {error}.") from error
 
 
-def _content_check(data: dict[str, Any], found: Certificate, odd: tuple[str, ...]) -> Check:
-    """No digit differs from what was written: digest and form of every number."""
+def content_check(data: dict[str, Any], found: Stated, odd: tuple[str, ...]) -> Check:
+    """Check that no digit differs from what was written: digest and form of every number.
+
+    Args:
+        data: the plain data.
+        found: what it states.
+        odd: numbers whose digits are not those of their double.
+    """
     sealed = content_digest(data) == found.question.hashes.get("content")
     if odd:
         detail = f"the number {odd[0]} is {float(odd[0])!r}"
@@ -111,19 +65,45 @@ def _content_check(data: dict[str, Any], found: Certificate, odd: tuple[str, ...
     return Check(name="content is as written", ok=sealed and not odd, detail=detail)
 
 
-def _typed(data: dict[str, Any], source: Any) -> Certificate:
+def typed(data: dict[str, Any], source: Any, kind: type[T]) -> T:
+    """Return what plain data states, if its types and sizes are those of a certificate.
+
+    Args:
+        data: the plain data.
+        source: what messages call it: a file, or the data itself.
+        kind: the class of certificates.
+
+    Raises:
+        CertificateError: it is not a certificate of this layout; the message names the key.
+    """
     name = "The data" if isinstance(source, Mapping) else source
     if data.get("schema") != SCHEMA:
         raise CertificateError(f"{name} is not a certificate of the layout {SCHEMA}.")
     try:
-        certificate = decoded(data, Certificate)
+        certificate = decoded(data, kind)
         _check_sizes(certificate)
     except CertificateError as error:
         raise CertificateError(f"{name} is not a certificate: {error}.") from error
     return certificate
 
 
-def _check_sizes(c: Certificate) -> None:
+def content_digest(data: Mapping[str, Any]) -> str:
+    """SHA-256 of a certificate's canonical JSON without this digest itself.
+
+    Args:
+        data: the certificate as plain data; doubles have one shortest decimal form, so that
+            equal numbers give equal digests.
+    """
+    others = {key: value for key, value in data["hashes"].items() if key != "content"}
+    content, digest = {**data, "hashes": others}, hashlib.sha256()
+    for at, key in enumerate(sorted(content)):
+        text = json.dumps(content[key], sort_keys=True, separators=(",", ":"), allow_nan=False)
+        digest.update(f"{',' if at else '{'}{json.dumps(key)}:{text}".encode())
+    digest.update(b"}")
+    return digest.hexdigest()
+
+
+def _check_sizes(c: Stated) -> None:
     """Refuse lists that do not fit each other, before anything is computed with them."""
     question, evidence = c.question, c.evidence
     edges = question.levels
@@ -153,7 +133,7 @@ def _check_sizes(c: Certificate) -> None:
     _check_instants(c)
 
 
-def _check_proofs(c: Certificate) -> None:
+def _check_proofs(c: Stated) -> None:
     """Rows of J* and sizes of W and Q follow from levels and criterion."""
     edges = c.question.levels
     certified = c.question.criterion is Criterion.CERTIFIED
@@ -173,7 +153,7 @@ def _check_proofs(c: Certificate) -> None:
                 raise CertificateError(f"`{key}` has {length} entries where {rows} are needed")
 
 
-def _check_instants(c: Certificate) -> None:
+def _check_instants(c: Stated) -> None:
     answer, evidence, count = c.answer, c.evidence, c.question.instants
     if not count:
         raise CertificateError("`instants` is 0; there must be one")
