@@ -7,7 +7,6 @@ in the controller is late like K_p, and no passive bound exists; computed in the
 import numpy as np
 
 import sealag
-from sealag.margin import delay_margin, jitter_margin
 
 URDF = "example-robot-data:go2_description/urdf/go2.urdf"
 STIFFNESS = 5000.0  # of gears and links, Nm/rad
@@ -40,7 +39,7 @@ class JointPD:
 print(" K_p   K_d  in       passive    jitter  constant")
 for K_p, K_d in ((20.0, 0.5), (40.0, 1.0), (80.0, 5.0)):
     for place, late, in_drives in (("centre", K_d, 0.01), ("drives", 0.0, K_d)):
-        motors = sealag.actuators(
+        motors = sealag.Actuators.of(
             robot.joints,
             spring_stiffness=STIFFNESS,
             rotor_inertia=0.01,
@@ -49,7 +48,7 @@ for K_p, K_d in ((20.0, 0.5), (40.0, 1.0), (80.0, 5.0)):
         )
         loop = sealag.freeze(JointPD(K_p, late), robot, motors, contacts=feet, q=posture).loop
         passive = "     none" if late else f"{1e3 * in_drives / K_p:6.2f} ms"  # K_p d ≤ K_d
-        jitter = jitter_margin(loop.A_0, loop.B, loop.C, symmetries=loop.symmetries).delay
-        constant = delay_margin(loop.A_0, loop.A_1, symmetries=loop.symmetries).delay
+        jitter = loop.jitter_margin().delay
+        constant = loop.margin().delay
         shown = f"{passive} {1e3 * jitter:6.2f} ms {1e3 * constant:6.2f} ms"
         print(f"{K_p:4.0f}  {K_d:4.1f}  {place:6} {shown}")

@@ -5,7 +5,7 @@ One series elastic joint under delayed position feedback of its motor angle.
 
 import numpy as np
 
-from sealag.margin import delay_margin, rightmost_roots
+from sealag.margin import DelayedLoop
 
 M, K, B_s, D_theta, F = 1.0, 350.0, 0.09, 10.0, 140.0
 A_0 = np.array(
@@ -19,10 +19,10 @@ A_0 = np.array(
 A_1 = np.zeros((4, 4))
 A_1[3, 1] = -F / B_s
 
-margin = delay_margin(A_0, A_1, intervals=True)
+margin = DelayedLoop(A_0, A_1).margin(intervals=True)
 print(f"margin {margin.delay * 1e3:.3f} ms, first crossing {margin.first_crossing * 1e3:.3f} ms")
 for part in margin.intervals[:3]:
     print(f"{part.lower * 1e3:8.2f} to {part.upper * 1e3:8.2f} ms: {part.unstable_roots} unstable")
 for share in (0.99, 1.01):
-    roots = rightmost_roots(A_0, A_1, delay=share * margin.delay)
+    roots = DelayedLoop(A_0, A_1).roots(delay=share * margin.delay)
     print(f"{share:.0%} of the margin: rightmost root {roots[0]:.3f} 1/s")

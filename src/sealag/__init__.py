@@ -12,7 +12,6 @@ _HOME = {
     "System": "sealag.design",
     "certify": "sealag.design",
     "load": "sealag.design",
-    "load_motion": "sealag.design",
     "simulate": "sealag.design",
     "verify_design": "sealag.design",
     "Controller": "sealag.whole_body",
@@ -61,7 +60,6 @@ __all__ = [
     "certify",
     "freeze",
     "load",
-    "load_motion",
     "load_robot",
     "simulate",
     "verify_design",
@@ -70,7 +68,7 @@ __all__ = [
 if TYPE_CHECKING:
     from sealag.actuation import Actuators
     from sealag.delay import Constant, Delays, Link, RoundTrip, Sinusoid
-    from sealag.design import System, certify, load, load_motion, simulate, verify_design
+    from sealag.design import System, certify, load, simulate, verify_design
     from sealag.errors import SealagError
     from sealag.passivity import Certificate
     from sealag.robot import Contact, Motion, load_robot

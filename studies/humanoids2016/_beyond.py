@@ -8,7 +8,6 @@ import numpy as np
 from humanoids2016._walk import WalkCase, at_delay_scale, walking_of
 from humanoids2016._walk_table import rough_grounds, walk_success
 from sealag.design import System, load
-from sealag.margin import DelayMargin
 from sealag.robot import Motion
 from sealag.simulation import Push
 from sealag.typing import Array
@@ -154,5 +153,5 @@ def _bounds(system: System, motion: Motion, stiffness: float) -> tuple[float, fl
         spaces = variant.spaces(motion)
         certified.append(float(variant.certified_bounds(spaces).delay.min()))
     sample = np.linspace(0, len(motion) - 1, LOOPS).astype(int)
-    crossings = [DelayMargin.of_loop(design.frozen(motion, int(k))).first_crossing for k in sample]
+    crossings = [design.frozen(motion, int(k)).margin().first_crossing for k in sample]
     return (*certified, float(min(crossings)))

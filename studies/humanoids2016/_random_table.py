@@ -6,7 +6,7 @@ import numpy as np
 
 from humanoids2016._random_plants import SeaPlant, random_sea_plant
 from sealag.errors import SolverError
-from sealag.margin import delay_margin
+from sealag.margin import DelayedLoop
 from sealag.passivity import Instant, Problem, max_delay, solve
 
 
@@ -63,7 +63,7 @@ def compare_plant(seed: int, *, joints: int | None = None) -> PlantComparison:
         problem = Problem.of_stiffness(plant.F, plant.D_theta)
         certified = float(solve(problem, share=Instant()).delay)
     try:
-        margin = delay_margin(plant.A_0, plant.A_1, symmetries=plant.symmetries).delay
+        margin = DelayedLoop(plant.A_0, plant.A_1, symmetries=plant.symmetries).margin().delay
     except SolverError:
         margin = None
     return PlantComparison(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sealag.actuation import Actuators
-from sealag.margin import DelayMargin, delay_margin
+from sealag.margin import DelayedLoop, DelayMargin
 from sealag.passivity import Instant, Problem, max_delay, solve
 from sealag.typing import Array
 from sealag.whole_body import FrozenLoop
@@ -60,7 +60,7 @@ def delayed_margin(
     none = np.zeros_like(F)
     C_z, C_theta = (-F, none) if link_feedback else (none, -F)
     loop = FrozenLoop.of_links(drives, M=M, H=none, S=np.eye(len(K)), C_z=C_z, C_theta=C_theta)
-    return delay_margin(loop.A_0, loop.A_1)
+    return DelayedLoop(loop.A_0, loop.A_1).margin()
 
 
 def _one_joint(M: float, K_q: float, *, link_feedback: bool = False) -> UnsafeExample:

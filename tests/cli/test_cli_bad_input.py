@@ -325,14 +325,13 @@ CSVS = {
 
 @pytest.mark.parametrize("name", CSVS)
 def test_csv_problem_is_named(name, walk, tmp_path, capsys):
-    from sealag.design import load_motion
 
     system, motion = walk
     path = tmp_path / "m.csv"
     system.save_motion(motion, path)
     good = path.read_text()
     path.write_text("\ufeff" + good.replace("\n", "\r\n"))
-    assert len(load_motion(path, system.robot, contacts=system.contacts)) == len(motion)
+    assert len(system.load_motion(path)) == len(motion)
     spoil, word = CSVS[name]
     path.write_text("\n".join(spoil(good.splitlines())))
     err = fails(capsys, "certify", "bundled:hume", "--motion", path)
@@ -458,13 +457,12 @@ def test_help_is_shown_without_a_command(capsys):
 
 
 def test_saved_motion_comes_back(walk, tmp_path):
-    from sealag.design import load_motion
 
     system, motion = walk
     for ending in (".csv", ".npz", ".parquet"):
         path = tmp_path / f"m{ending}"
         system.save_motion(motion, path)
-        back = load_motion(path, system.robot, contacts=system.contacts)
+        back = system.load_motion(path)
         np.testing.assert_allclose(back.q, motion.q, atol=1e-15)
         np.testing.assert_allclose(back.v, motion.v, atol=1e-15)
         held = [[c.frame for c in back.contact_sets[i]] for i in back.contact_index]

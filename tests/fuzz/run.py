@@ -15,7 +15,7 @@ import sealag
 from fuzz.mutate import mutated, mutated_urdf
 from helpers.toml import to_toml
 from sealag.errors import SealagError
-from sealag.report import mujoco_model
+from sealag.report import MujocoModel
 
 ROOT = Path(__file__).resolve().parents[2]
 CASES = ROOT / "tests" / "data" / "cases"
@@ -97,7 +97,7 @@ def _stages(path: Path):
         yield "certify", lambda: sealag.certify(system)
         yield "margin", lambda: system.local_margins()
         yield "simulate", lambda: sealag.simulate(system, duration=0.05)
-        yield "export", lambda: mujoco_model(system)
+        yield "export", lambda: MujocoModel.of(system)
 
 
 def tried(path: Path, seed: int) -> Finding | None:

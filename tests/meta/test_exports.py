@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from helpers.source import ROOT, exported, imported, modules, tree
 
-MOST = 96
+MOST = 89
 """Names of all rooms together: fewer than 90."""
 NO_ROOMS = {"sealag.cli", "sealag.data", "sealag.kernels"}
 """The command line is called by its entry point; data and kernels export nothing."""
@@ -89,16 +89,16 @@ def test_rooms_export_few_names():
 
 def test_uses_in_code_are_found():
     text = (
-        "import sealag\nfrom sealag import design\ndesign.certify\nsealag.margin.delay_margin(A, B)"
+        "import sealag\nfrom sealag import design\ndesign.certify\nsealag.margin.DelayedLoop(A, B)"
     )
     assert set(_uses_in_code(ast.parse(text))) >= {
         ("sealag.design", "certify"),
-        ("sealag.margin", "delay_margin"),
+        ("sealag.margin", "DelayedLoop"),
     }
 
 
 def test_uses_in_documentation_are_found():
-    text = "`sealag.passivity.max_delay(J)`\n    from sealag.margin import a, b\n    sealag.load(x)"
+    text = "`sealag.passivity.max_delay(J)`\n    from sealag.margin import a, b\n    sealag.loadx"
     assert set(_uses_in_text(text)) >= {
         ("sealag.passivity", "max_delay"),
         ("sealag.margin", "a"),

@@ -205,7 +205,7 @@ def answer(folder: Any, changes: dict[str, Any]) -> tuple[Any, str]:
         system = sealag.load(path)
         motion = None
         if system.motion_file:
-            motion = sealag.load_motion(system.motion_file, system.robot)
+            motion = system.load_motion(system.motion_file)
         found = sealag.certify(system, motion)
     except SealagError as error:
         return str(error), ""

@@ -18,7 +18,6 @@ from oracle.black_box.corpus import SUITE, random_design
 from oracle.black_box.motion import compare_motion, judge_motion, random_motion
 from oracle.black_box.rest import NoEquilibrium
 from oracle.black_box.threshold import at_threshold
-from sealag.design import load_motion
 
 pytestmark = pytest.mark.slow
 
@@ -72,7 +71,7 @@ def test_no_instant_of_a_motion_differs(tmp_path):
 def test_a_wrong_instant_is_noticed():
     path = CASE.with_name("s3_second_instant.toml")
     system = sealag.load(path)
-    motion = load_motion(path.with_suffix(".csv"), system.robot, contacts=system.contacts)
+    motion = system.load_motion(path.with_suffix(".csv"))
     found = sealag.certify(system, motion, proofs=1)
     ours = [
         BlackBox(path, system, q=motion.q[k], contacts=motion.contact_sets[c]).both()

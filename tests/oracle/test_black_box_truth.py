@@ -14,7 +14,6 @@ from oracle.black_box.box import BlackBox
 from oracle.black_box.law import Unsettled
 from oracle.black_box.rest import NoEquilibrium
 from oracle.black_box.roots import Late, first_crossing, roots
-from sealag.design import load_motion
 
 CASES = Path(__file__).parent / "black_box" / "cases"
 
@@ -113,7 +112,7 @@ def test_beside_the_singular_posture_the_margin_is_shorter(tmp_path):
 def test_instants_of_a_motion():
     path = CASES / "s3_second_instant.toml"
     system = sealag.load(path)
-    motion = load_motion(path.with_suffix(".csv"), system.robot, contacts=system.contacts)
+    motion = system.load_motion(path.with_suffix(".csv"))
     found = [
         BlackBox(path, system, q=motion.q[k], contacts=motion.contact_sets[c]).both()
         for k, c in enumerate(motion.contact_index)

@@ -12,8 +12,7 @@ from helpers.mimics import joint, link, robot
 from helpers.mujoco_export import Exported
 from helpers.small_systems import arm, arm_system, constant_delays
 from sealag.delay import Constant
-from sealag.margin import sampled_margin
-from sealag.report import mujoco_model
+from sealag.report import MujocoModel
 from sealag.simulation import Clock, Foot, Network, Scene, closed_loop
 
 STEP = 1e-3
@@ -159,7 +158,7 @@ def exported(request, tmp_path_factory):
         system = _sliding(tmp_path_factory.mktemp("sliding"))
     else:
         system = sealag.load(EXAMPLES / f"{request.param}.toml")
-    return Exported.of(system, mujoco_model(system))
+    return Exported.of(system, MujocoModel.of(system))
 
 
 class TestDelays:
@@ -292,7 +291,7 @@ class TestClosedLoop:
         return run, places[: round(self.duration / delays.sample_time)]
 
     def _theirs(self, system, step):
-        file = mujoco_model(system, step=step)
+        file = MujocoModel.of(system, step=step)
         there = Exported.of(system, file)
         places = there.run(system.controller(), self.duration, moved=self.moved, rotors=self.rotors)
         return file, places[:: file.steps.tick]
@@ -321,12 +320,12 @@ class TestClosedLoop:
         period = 0.01
         prompt = constant_delays(0.0, 0.0, sample_time=period)
         loop = arm_system(tmp_path, delays=prompt).frozen()
-        margin = sampled_margin(loop.A_0, loop.B, loop.C, period=period).delay
+        margin = loop.sampled_margin(period=period).delay
         assert margin is not None
         for share in (0.97, 1.03):
             late = constant_delays(0.0, round(share * margin, 4), sample_time=period)
             system = arm_system(tmp_path, delays=late)
-            there = Exported.of(system, mujoco_model(system, step=1e-4))
+            there = Exported.of(system, MujocoModel.of(system, step=1e-4))
             places = there.run(system.controller(), 40.0, moved=0.05)
             swing = [np.ptp(part, axis=0).max() for part in np.array_split(places, 4)]
             print(margin, share, swing)
@@ -358,7 +357,7 @@ def test_a_quadruped_on_held_feet_moves_as_the_simulator_says():
         return np.hstack([system.robot.joint_positions(run.q), run.theta])[:-1]
 
     def theirs(step):
-        there = Exported.of(system, mujoco_model(system, step=step))
+        there = Exported.of(system, MujocoModel.of(system, step=step))
         places = there.run(system.controller(), duration, rotors=moved)
         return places[:: there.file.steps.tick, 7:]
 

@@ -4,7 +4,7 @@ import jitcdde
 import numpy as np
 
 from humanoids2016 import random_sea_plant
-from sealag.margin import delay_margin
+from sealag.margin import DelayedLoop
 
 
 def growth(A_0: np.ndarray, A_1: np.ndarray, *, delay: float, omega: float, mode) -> float:
@@ -35,7 +35,7 @@ def plants() -> list[int]:
     found = []
     for seed in range(200):
         plant = random_sea_plant(seed, joints=1 + seed % 2)
-        answer = delay_margin(plant.A_0, plant.A_1, symmetries=plant.symmetries)
+        answer = DelayedLoop(plant.A_0, plant.A_1, symmetries=plant.symmetries).margin()
         fast = np.abs(np.linalg.eigvals(plant.A_0)).max()
         if 0.0 < answer.delay < 10.0 and not answer.neutral and fast < 60.0 * answer.frequency:
             found.append(seed)
@@ -49,7 +49,7 @@ def test_simulation_agrees_just_below_and_just_above() -> None:
     assert len(seeds) == 20
     for seed in seeds:
         plant = random_sea_plant(seed, joints=1 + seed % 2)
-        answer = delay_margin(plant.A_0, plant.A_1)
+        answer = DelayedLoop(plant.A_0, plant.A_1).margin()
         common = {"omega": answer.frequency, "mode": answer.mode}
         below = growth(plant.A_0, plant.A_1, delay=0.97 * answer.delay, **common)
         above = growth(plant.A_0, plant.A_1, delay=1.03 * answer.delay, **common)

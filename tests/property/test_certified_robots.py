@@ -17,7 +17,6 @@ import pytest
 from helpers.designs import EXAMPLES
 from sealag.design import load
 from sealag.errors import SolverError
-from sealag.margin import DelayMargin, rightmost_roots
 from sealag.passivity import Instant, Problem, solve
 from sealag.robot import Contact, ContactKind, Motion
 from sealag.whole_body import (
@@ -150,7 +149,7 @@ def compared(name, signal, gravity, wanted):
             continue
         loop = system.frozen(motion, k, rest=system.in_posture(motion, k))
         try:
-            margin = DelayMargin.of_loop(loop).delay
+            margin = loop.margin().delay
         except SolverError:
             continue
         found.append(Compared(loop, margin, certified.delay[k], published.delay[k]))
@@ -185,7 +184,7 @@ def test_certified_and_stable_never_exceeds_the_margin(case):
     first = found[0]
     if len(first.loop.A_0) < 40:
         below, above = (
-            rightmost_roots(first.loop.A_0, first.loop.A_1, delay, count=6).real.max()
+            first.loop.roots(delay, count=6).real.max()
             for delay in (first.certified, 1.3 * first.margin)
         )
         assert below < 1e-6 < above, "collocation must tell the two delays apart"

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from humanoids2016 import PlantComparison, compare_plant, random_sea_plant
-from sealag.margin import delay_margin
+from sealag.margin import DelayedLoop
 from sealag.whole_body import Signal
 
 PLANTS = 1000
@@ -59,8 +59,8 @@ def test_drawn_plants_are_never_over_certified(seed: int, joints: int) -> None:
 def test_faster_time_shortens_the_margin(seed: int, rate: float) -> None:
     plant = random_sea_plant(seed, joints=2, form="symmetric")
     known = {"symmetries": plant.symmetries}
-    slow = delay_margin(plant.A_0, plant.A_1, **known)
-    fast = delay_margin(rate * plant.A_0, rate * plant.A_1, **known)
+    slow = DelayedLoop(plant.A_0, plant.A_1, **known).margin()
+    fast = DelayedLoop(rate * plant.A_0, rate * plant.A_1, **known).margin()
     np.testing.assert_allclose(rate * fast.first_crossing, slow.first_crossing, rtol=1e-6)
 
 
@@ -72,6 +72,6 @@ def test_other_coordinates_do_not_change_it(seed: int) -> None:
     if np.linalg.cond(T) > 1e3:
         return
     turned = [np.linalg.solve(T, A @ T) for A in (plant.A_0, plant.A_1)]
-    before = delay_margin(plant.A_0, plant.A_1, symmetries=plant.symmetries)
-    after = delay_margin(*turned, symmetries=np.linalg.solve(T, plant.symmetries))
+    before = DelayedLoop(plant.A_0, plant.A_1, symmetries=plant.symmetries).margin()
+    after = DelayedLoop(*turned, symmetries=np.linalg.solve(T, plant.symmetries)).margin()
     np.testing.assert_allclose(after.first_crossing, before.first_crossing, rtol=1e-5)

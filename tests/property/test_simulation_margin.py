@@ -8,7 +8,7 @@ import pytest
 from helpers.designs import EXAMPLES, random_arm, rough_delays
 from sealag.delay import Constant, Delays, Link, RoundTrip
 from sealag.design import certify, load, simulate
-from sealag.margin import delay_margin
+from sealag.margin import DelayedLoop
 from sealag.passivity import Instant, Problem, solve
 from sealag.simulation import Clock, Network, Outcome, Push, Scene, closed_loop
 
@@ -65,7 +65,7 @@ def _growth(arm, margin, share, *, periods=60, up=0.0):
 @pytest.mark.parametrize("seed", range(50))
 def test_margin_parts_convergence_from_divergence(tmp_path, seed):
     arm = random_arm(tmp_path, seed)
-    margin = delay_margin(*arm.loop())
+    margin = DelayedLoop(*arm.loop()).margin()
     assert 0.0 < margin.delay < np.inf
     assert _growth(arm, margin, 0.95) < 1
     assert _growth(arm, margin, 1.05) > 1
@@ -78,7 +78,7 @@ def test_gravity_is_part_of_the_margin(tmp_path, seed, share):
     A_0, A_1 = arm.loop()
     n = arm.robot.n
     A_0[n : 2 * n, :n] += np.linalg.solve(arm.robot.mass_matrix(arm.q), arm.slope())
-    growth = _growth(arm, delay_margin(A_0, A_1), share)
+    growth = _growth(arm, DelayedLoop(A_0, A_1).margin(), share)
     assert (growth > 1) == (share < 1)
 
 
@@ -86,7 +86,7 @@ def test_gravity_is_part_of_the_margin(tmp_path, seed, share):
 def test_only_the_sum_of_both_ways_moves_the_roots(tmp_path, seed):
     """d_1 decides, d_2 does not: the same total gives the same swing however it is split."""
     arm = random_arm(tmp_path, seed)
-    margin = delay_margin(*arm.loop())
+    margin = DelayedLoop(*arm.loop()).margin()
     growth = [_growth(arm, margin, 1.05, up=up) for up in (0.0, 0.3, 0.9)]
     np.testing.assert_allclose(growth[1:], growth[0], rtol=1e-6)
     assert _growth(arm, margin, 1.15, up=0.3) > 1.05 * growth[1]
@@ -120,7 +120,7 @@ def test_margin_parts_convergence_from_divergence_on_whole_robots(name, frame, f
     """Baxter's 14 joints, and ANYmal on its four feet, swaying sideways."""
     system = load(EXAMPLES / f"{name}.toml")
     frozen = system.frozen()
-    margin = delay_margin(frozen.A_0, frozen.A_1, symmetries=frozen.symmetries).delay
+    margin = frozen.margin().delay
     assert 0.0 < margin < np.inf
     assert _robot_growth(system, 0.95 * margin, frame=frame, force=force) < 1
     assert _robot_growth(system, 1.05 * margin, frame=frame, force=force) > 1

@@ -11,7 +11,7 @@ import sealag
 from helpers.certificates import failures, made, plain, resealed
 from helpers.designs import EXAMPLES
 from humanoids2016 import random_sea_plant
-from sealag.margin import delay_margin, rightmost_roots
+from sealag.margin import DelayedLoop
 from sealag.passivity import Certificate
 
 NO_EARLIER = "no root crosses before"
@@ -53,7 +53,7 @@ def plants(count):
         seed += 1
         if plant.symmetries.size:
             continue
-        margin = delay_margin(plant.A_0, plant.A_1)
+        margin = DelayedLoop(plant.A_0, plant.A_1).margin()
         if np.isfinite(margin.first_crossing) and not margin.unstable_roots:
             found += 1
             yield plant, margin
@@ -116,7 +116,7 @@ def test_the_same_crossings_by_counting_roots():
             words = checks[NO_EARLIER].detail.split(" roots")[0]
             counts = [int(word) for word in words.split(", ")]
             for share, count in zip((0.25, 0.5, 0.75, 0.999), counts):
-                right = rightmost_roots(plant.A_0, plant.A_1, share * crossing, count=8)
+                right = DelayedLoop(plant.A_0, plant.A_1).roots(share * crossing, count=8)
                 assert count == int((right.real > 0.0).sum())
 
 
@@ -151,7 +151,7 @@ def test_every_example_has_a_loop_that_gives_its_margin():
     for design in ("baxter", "moving", "one foot"):
         data = made(design)
         A_0, A_1, V = matrices(data)
-        margin = delay_margin(A_0, A_1, symmetries=V)
+        margin = DelayedLoop(A_0, A_1, symmetries=V).margin()
         assert margin.unstable_roots == data["unstable_modes"]
         assert margin.first_crossing == pytest.approx(data["first_crossing_s"], rel=1e-9)
 

@@ -14,7 +14,6 @@ import sealag
 from sealag.cli import main
 from sealag.design import load
 from sealag.errors import SolverError
-from sealag.margin import DelayMargin
 from sealag.simulation import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,7 +51,7 @@ def test_margins_of_examples(name, margin):
 
 def test_damping_of_a_urdf_acts():
     baxter = undamped(load(ROOT / "examples" / "baxter.toml"))
-    assert DelayMargin.of_loop(baxter.frozen()).delay == pytest.approx(101.9631e-3, abs=1e-7)
+    assert baxter.frozen().margin().delay == pytest.approx(101.9631e-3, abs=1e-7)
     best = case("dampbest")
     assert best.local_margins().delay_s == pytest.approx(52.286e-3, abs=1e-6)
     assert undamped(best).local_margins().delay_s == pytest.approx(62.687e-3, abs=1e-6)
@@ -73,7 +72,7 @@ def test_slow_drives_cost_margin(bandwidth, damped, margin):
     system = case("s2_torque_bandwidth_baxter")
     system = with_drives(system, torque_bandwidth=np.full(14, bandwidth))
     loop = (system if damped else undamped(system)).frozen()
-    assert DelayMargin.of_loop(loop).delay == pytest.approx(margin * 1e-3, abs=5e-6)
+    assert loop.margin().delay == pytest.approx(margin * 1e-3, abs=5e-6)
 
 
 def test_slow_drives_are_covered_by_no_bound():
@@ -195,7 +194,7 @@ def test_the_loop_rests_elsewhere_with_another_margin():
     """Soft springs, motor angles: 13.9 ms in the posture, less where it sags to."""
     system = case("unclear_own_equilibrium")
     certificate = sealag.certify(system)
-    assert DelayMargin.of_loop(system.frozen(rest=system.in_posture())).delay == pytest.approx(
+    assert system.frozen(rest=system.in_posture()).margin().delay == pytest.approx(
         13.94e-3, abs=1e-5
     )
     assert certificate.answer.local_margin_s == pytest.approx(5.1275e-3, abs=1e-6)

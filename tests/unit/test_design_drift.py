@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from sealag.margin import DelayMargin
 from sealag.whole_body import FrozenLoop
 
 
@@ -23,14 +22,14 @@ def _loop(rate, turn):
 @pytest.mark.parametrize("rate", [-5e-12, 0.0, 5e-12])
 @pytest.mark.parametrize("turn", [0.0, 4e-10])
 def test_what_rounding_leaves_of_a_zero_root_is_not_stable(rate, turn):
-    found = DelayMargin.of_loop(_loop(rate, turn))
+    found = _loop(rate, turn).margin()
     assert (found.delay, found.unstable_roots) == (0.0, 2)
 
 
 @pytest.mark.parametrize("rate", [-1e-6, -1.0])
 def test_a_slow_decay_is_stable(rate):
     """The control: the margin is the oscillator's, |−ω² + ωj + 4| = 3."""
-    found = DelayMargin.of_loop(_loop(rate, 0.0))
+    found = _loop(rate, 0.0).margin()
     crossings = np.sqrt(np.roots([1.0, -7.0, 7.0]).real)
     phases = [np.angle(-3.0 / (4.0 - w**2 + 1j * w)) % (2.0 * np.pi) for w in crossings]
     assert found.unstable_roots == 0

@@ -10,7 +10,6 @@ from helpers.certificates import half_a_step
 from helpers.designs import EXAMPLES
 from sealag.actuation import Actuators
 from sealag.design import local_margins
-from sealag.margin import jitter_margin
 from sealag.robot import Motion
 from sealag.whole_body import LinkAngles, MotorAngles
 
@@ -108,7 +107,7 @@ def test_a_law_that_sags_has_the_smaller_of_posture_and_rest():
         system.frozen(motion, 0, rest=rest)
         for rest in (system.in_posture(motion, 0), system.rest(motion, 0))
     ]
-    alone = [jitter_margin(loop.A_0, loop.B, loop.C).delay for loop in loops]
+    alone = [loop.jitter_margin().delay for loop in loops]
     assert max(alone) > 1.0001 * min(alone)
     assert local_margins(system).jitter_s == pytest.approx(min(alone), rel=1e-7)
 

@@ -8,8 +8,7 @@ import pytest
 
 import sealag
 from helpers.small_systems import arm, arm_system, joint_task
-from sealag.design import load, load_motion
-from sealag.margin import DelayMargin
+from sealag.design import load
 from sealag.passivity import Basis
 from sealag.robot import Motion
 from sealag.whole_body import Law, MotorAngles, StaticJoint, Task
@@ -19,7 +18,7 @@ CASES = Path(__file__).resolve().parents[1] / "data" / "cases"
 
 def second_instant():
     system = load(CASES / "s3_second_instant.toml")
-    motion = load_motion(CASES / "s3_second_instant.csv", system.robot, contacts=system.contacts)
+    motion = system.load_motion(CASES / "s3_second_instant.csv")
     return system, motion
 
 
@@ -50,7 +49,7 @@ def test_at_that_instant_alone_the_loop_in_the_posture_is_what_is_597_ms():
     """The tasks there have no error; what supports it does."""
     system, motion = second_instant()
     loop = system.frozen(motion, 1, rest=system.in_posture(motion, 1))
-    assert DelayMargin.of_loop(loop).delay == pytest.approx(0.597454, abs=1e-6)
+    assert loop.margin().delay == pytest.approx(0.597454, abs=1e-6)
 
 
 def swinging(folder, *, count=40, signal=None, gravity="planned", tasks=None):
@@ -85,7 +84,7 @@ def test_what_bounds_decide_agrees_with_deciding_all(tmp_path, gravity):
     pruned, bounds = decided(system, motion)
     whole, _ = decided(system, motion, refuse=True)
     assert whole.count(Basis.EXACT) == len(motion)
-    each = [DelayMargin.of_loop(system.frozen(motion, k)).delay for k in range(len(motion))]
+    each = [system.frozen(motion, k).margin().delay for k in range(len(motion))]
     np.testing.assert_allclose(whole.delay, each, rtol=1e-9)
     assert 0 < pruned.count(Basis.EXACT) < len(motion) / 4
     assert pruned.count(Basis.SEARCHED) > 0
@@ -154,9 +153,7 @@ def test_one_unstable_instant_makes_the_motion_unstable(tmp_path):
     turning[:, 0] = np.linspace(1.5, -1.5, 12)
     motion = replace(motion, q=turning)
     local, _ = decided(system, motion)
-    each = [
-        DelayMargin.of_loop(system.frozen(motion, k)).unstable_roots for k in range(len(motion))
-    ]
+    each = [system.frozen(motion, k).margin().unstable_roots for k in range(len(motion))]
     assert 0 in each
     assert max(each) > 0
     assert local.unstable_roots.tolist() == each

@@ -20,13 +20,13 @@ def anymal(way=0.009):
 
 
 def test_each_rate_costs_half_a_period():
-    exact = local_margins(anymal()).delay_s
+    exact = anymal().local_margins().delay_s
     for rate in anymal().rate_sweep([50.0, 100.0]):
         assert rate.way_s == pytest.approx(0.009)
         assert rate.stable is True
-        if rate.margin.delay is not None:
-            assert rate.margin.delay == pytest.approx(exact - 0.5 / rate.rate_hz, rel=5e-3)
-            assert rate.margin.proven < rate.margin.delay
+        if rate.largest_s is not None:
+            assert rate.largest_s == pytest.approx(exact - 0.5 / rate.rate_hz, rel=5e-3)
+            assert rate.proven_s < rate.largest_s
 
 
 def test_a_way_between_two_margins_needs_the_faster_rate():

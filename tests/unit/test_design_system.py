@@ -11,7 +11,6 @@ from helpers.small_systems import arm, arm_system, constant_delays, joint_task
 from sealag.actuation import Actuators
 from sealag.design import System, load
 from sealag.errors import InputError, UnknownNameError
-from sealag.margin import DelayMargin
 from sealag.robot import Contact, Motion, load_robot
 from sealag.simulation import Outcome
 from sealag.whole_body import Law, Measurement, StaticJoint, Task
@@ -35,7 +34,7 @@ def test_it_answers_every_question_without_a_file(system):
     F_q = 30.0 * np.eye(2) - system.robot.gravity_gradient(system.posture)
     series = np.linalg.inv(np.linalg.inv(F_q) - np.diag(1.0 / system.actuators.spring_stiffness))
     np.testing.assert_allclose(spaces.F_theta[0], series, rtol=1e-6, atol=1e-6)
-    margin = DelayMargin.of_loop(loop).delay
+    margin = loop.margin().delay
     assert certificate.answer.max_delay_s < margin
     assert certificate.answer.local_margin_s == pytest.approx(margin, rel=1e-9)
     assert system.local_margins().delay_s == pytest.approx(margin, rel=1e-9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sealag.errors import InputError
-from sealag.margin import delay_margin, rightmost_roots
+from sealag.margin import DelayedLoop
 
 
 @pytest.mark.parametrize(
@@ -27,31 +27,31 @@ from sealag.margin import delay_margin, rightmost_roots
     ],
 )
 def test_sentence_says_what_is_wrong(value, words: str) -> None:
-    for ask in (delay_margin, lambda A_0, A_1: rightmost_roots(A_0, A_1, 0.1)):
+    for ask in (DelayedLoop.margin, lambda loop: loop.roots(0.1)):
         with pytest.raises(InputError) as refused:
-            ask(value, [[1.0]])
+            ask(DelayedLoop(value, [[1.0]]))
         assert str(refused.value).startswith(words)
         assert str(refused.value).endswith(".")
 
 
 def test_other_arguments_are_checked_the_same_way() -> None:
     with pytest.raises(InputError, match="A_1 is nothing"):
-        delay_margin([[1.0]], None)  # type: ignore[arg-type]
+        DelayedLoop([[1.0]], None).margin()  # type: ignore[arg-type]
     with pytest.raises(InputError, match="symmetries is no array of numbers"):
-        delay_margin([[0.0]], [[0.0]], symmetries="yaw")
+        DelayedLoop([[0.0]], [[0.0]], symmetries="yaw").margin()
     with pytest.raises(InputError, match="horizon is -1"):
-        delay_margin([[0.0]], [[-1.0]], horizon=-1.0)
+        DelayedLoop([[0.0]], [[-1.0]]).margin(horizon=-1.0)
     with pytest.raises(InputError, match="delay is no array of numbers"):
-        rightmost_roots([[0.0]], [[-1.0]], "soon")  # type: ignore[arg-type]
+        DelayedLoop([[0.0]], [[-1.0]]).roots("soon")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="A_0 is complex"):
-        delay_margin(1j * np.ones((1, 1)), np.ones((1, 1)))
+        DelayedLoop(1j * np.ones((1, 1)), np.ones((1, 1))).margin()
 
 
 def test_numbers_of_other_kinds_are_taken() -> None:
     from fractions import Fraction
 
-    assert delay_margin([[0]], [[Fraction(-1)]]).delay == pytest.approx(np.pi / 2)
-    assert delay_margin([[False]], [[-1]]).delay == pytest.approx(np.pi / 2)
+    assert DelayedLoop([[0]], [[Fraction(-1)]]).margin().delay == pytest.approx(np.pi / 2)
+    assert DelayedLoop([[False]], [[-1]]).margin().delay == pytest.approx(np.pi / 2)
 
 
 def test_a_horizon_with_endless_crossings_names_one_that_is_short_enough() -> None:
@@ -59,12 +59,12 @@ def test_a_horizon_with_endless_crossings_names_one_that_is_short_enough() -> No
     with pytest.raises(
         InputError, match=r"horizon is 1e\+15 ms \(1e\+12 s\).* at most 10,000 are listed"
     ) as no:
-        delay_margin([[0.0]], [[-1.0]], horizon=1e12)
+        DelayedLoop([[0.0]], [[-1.0]]).margin(horizon=1e12)
     short = re.search(r"ask for (\S+) s \(--horizon-ms (\S+)\)", str(no.value))
     assert short is not None
     seconds, milliseconds = map(float, short.groups())
     assert milliseconds == pytest.approx(1e3 * seconds)
-    assert 5_000 < len(delay_margin([[0.0]], [[-1.0]], horizon=seconds).intervals) <= 10_000
+    assert 5_000 < len(DelayedLoop([[0.0]], [[-1.0]]).margin(horizon=seconds).intervals) <= 10_000
     slow_and_fast = np.diag([-1.0, -1e6])
     with pytest.raises(InputError, match=r"horizon is .* are listed"):
-        delay_margin(0.0 * slow_and_fast, slow_and_fast, intervals=True)
+        DelayedLoop(0.0 * slow_and_fast, slow_and_fast).margin(intervals=True)

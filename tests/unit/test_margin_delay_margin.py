@@ -7,7 +7,7 @@ import pytest
 
 from humanoids2016 import random_sea_plant
 from sealag.errors import InputError, SolverError
-from sealag.margin import delay_margin, rightmost_roots
+from sealag.margin import DelayedLoop
 
 KNOWN = [
     ([[-2, 0], [0, -0.9]], [[-1, 0], [-1, -1]], math.acos(-0.9) / math.sqrt(0.19)),
@@ -30,14 +30,14 @@ def one_joint(M: float, F: float, *, link: bool = False) -> tuple[np.ndarray, np
 
 @pytest.mark.parametrize(("A_0", "A_1", "expected"), KNOWN)
 def test_known_margins_to_six_digits(A_0, A_1, expected: float) -> None:
-    answer = delay_margin(A_0, A_1, confirm=True)
+    answer = DelayedLoop(A_0, A_1).margin(confirm=True)
     assert answer.delay == pytest.approx(expected, rel=1e-6)
     assert answer.guaranteed
     assert answer.residual < 1e-12
 
 
 def test_delay_stabilised_system_lists_its_stable_interval() -> None:
-    answer = delay_margin([[0, 1], [-2, 0.1]], [[0, 0], [1, 0]], intervals=True)
+    answer = DelayedLoop([[0, 1], [-2, 0.1]], [[0, 0], [1, 0]]).margin(intervals=True)
     assert (answer.delay, answer.unstable_roots) == (0.0, 2)
     assert answer.first_crossing == pytest.approx(1.717858, rel=1e-6)
     stable = [part for part in answer.intervals if part.unstable_roots == 0]
@@ -47,9 +47,9 @@ def test_delay_stabilised_system_lists_its_stable_interval() -> None:
 
 
 def test_touching_root_has_no_direction_and_a_crossing_one_has() -> None:
-    touching = delay_margin([[0, 1], [-1, -1]], [[0, 0], [0, -1]])
+    touching = DelayedLoop([[0, 1], [-1, -1]], [[0, 0], [0, -1]]).margin()
     assert [crossing.direction for crossing in touching.crossings] == [0]
-    crossing = delay_margin([[0]], [[-1]])
+    crossing = DelayedLoop([[0]], [[-1]]).margin()
     assert [item.direction for item in crossing.crossings] == [1]
 
 
@@ -59,12 +59,14 @@ def test_touching_root_has_no_direction_and_a_crossing_one_has() -> None:
 )
 def test_one_joint_of_theory_6b(M: float, K_q: float, link: bool, expected: float) -> None:
     F = K_q if link else 1.0 / (1.0 / K_q - 1.0 / 350.0)
-    assert delay_margin(*one_joint(M, F, link=link)).delay == pytest.approx(expected, rel=2e-3)
+    assert DelayedLoop(*one_joint(M, F, link=link)).margin().delay == pytest.approx(
+        expected, rel=2e-3
+    )
 
 
 def test_mode_solves_the_characteristic_equation() -> None:
     A_0, A_1 = one_joint(1.0, 140.0)
-    answer = delay_margin(A_0, A_1)
+    answer = DelayedLoop(A_0, A_1).margin()
     s = 1j * answer.frequency
     P = s * np.eye(4) - A_0 - A_1 * np.exp(-s * answer.delay)
     assert np.abs(P @ answer.mode).max() < 1e-8 * np.abs(P).max()
@@ -82,43 +84,43 @@ def test_symmetries_and_their_momentum_are_divided_out() -> None:
     T = np.random.default_rng(0).normal(size=(6, 6))
     mixed = [np.linalg.solve(T, A @ T) for A in (wide_0, wide_1)]
     direction = np.linalg.solve(T, np.eye(6)[:, [4]])
-    answer = delay_margin(*mixed, symmetries=direction)
+    answer = DelayedLoop(*mixed, symmetries=direction).margin()
     assert answer.neutral == 2
-    assert answer.delay == pytest.approx(delay_margin(A_0, A_1).delay, rel=1e-8)
-    assert delay_margin(*mixed).delay == 0.0
+    assert answer.delay == pytest.approx(DelayedLoop(A_0, A_1).margin().delay, rel=1e-8)
+    assert DelayedLoop(*mixed).margin().delay == 0.0
     with pytest.raises(SolverError, match="no symmetry of the loop"):
-        delay_margin(*mixed, symmetries=np.eye(6)[:, [0]])
+        DelayedLoop(*mixed, symmetries=np.eye(6)[:, [0]]).margin()
 
 
 def test_neutral_equilibrium_that_is_not_declared_is_not_called_stable() -> None:
-    answer = delay_margin([[-1.0]], [[1.0]])
+    answer = DelayedLoop([[-1.0]], [[1.0]]).margin()
     assert (answer.delay, answer.unstable_roots, answer.guaranteed) == (0.0, 1, False)
 
 
 def test_identical_joints_cross_together() -> None:
     A_0, A_1 = one_joint(1.0, 140.0)
     twice = [np.kron(np.eye(2), A) for A in (A_0, A_1)]
-    answer = delay_margin(*twice, intervals=True)
-    assert answer.delay == pytest.approx(delay_margin(A_0, A_1).delay, rel=1e-9)
+    answer = DelayedLoop(*twice).margin(intervals=True)
+    assert answer.delay == pytest.approx(DelayedLoop(A_0, A_1).margin().delay, rel=1e-9)
     assert answer.intervals[1].unstable_roots == 4
 
 
 def test_no_delayed_part_and_nothing_left() -> None:
-    assert delay_margin([[-1.0]], [[0.0]]).delay == math.inf
-    assert delay_margin([[1.0]], [[0.0]]).delay == 0.0
-    assert delay_margin([[0.0]], [[0.0]], symmetries=[[1.0]]).delay == math.inf
+    assert DelayedLoop([[-1.0]], [[0.0]]).margin().delay == math.inf
+    assert DelayedLoop([[1.0]], [[0.0]]).margin().delay == 0.0
+    assert DelayedLoop([[0.0]], [[0.0]], symmetries=[[1.0]]).margin().delay == math.inf
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_intervals_agree_with_counted_roots(seed: int) -> None:
     plant = random_sea_plant(seed, joints=2)
-    answer = delay_margin(
-        plant.A_0, plant.A_1, symmetries=plant.symmetries, intervals=True, horizon=1.0
+    answer = DelayedLoop(plant.A_0, plant.A_1, symmetries=plant.symmetries).margin(
+        intervals=True, horizon=1.0
     )
     for part in [part for part in answer.intervals if part.upper - part.lower > 1e-3][:4]:
         middle = (part.lower + min(part.upper, 1.0)) / 2.0
-        roots = rightmost_roots(
-            plant.A_0, plant.A_1, delay=middle, count=16, symmetries=plant.symmetries
+        roots = DelayedLoop(plant.A_0, plant.A_1, symmetries=plant.symmetries).roots(
+            delay=middle, count=16
         )
         assert int((roots.real > 0.0).sum()) == part.unstable_roots
 
@@ -129,10 +131,10 @@ def test_intervals_agree_with_counted_roots(seed: int) -> None:
 )
 def test_unusable_matrices_are_refused(A_0, A_1) -> None:
     with pytest.raises(InputError):
-        delay_margin(A_0, A_1)
+        DelayedLoop(A_0, A_1).margin()
 
 
 @pytest.mark.parametrize("delay", [-1.0, math.nan, math.inf])
 def test_unusable_delay_is_refused(delay: float) -> None:
     with pytest.raises(InputError):
-        rightmost_roots([[0]], [[-1]], delay=delay)
+        DelayedLoop([[0]], [[-1]]).roots(delay=delay)

@@ -7,7 +7,7 @@ import pytest
 
 from humanoids2016 import random_sea_plant
 from sealag.errors import InputError, SolverError
-from sealag.margin import delay_margin, rightmost_roots
+from sealag.margin import DelayedLoop
 
 
 def collocated(A_0, A_1, A_e, d: float, e: float, *, nodes: int = 44) -> np.ndarray:
@@ -51,28 +51,28 @@ def test_two_delays_of_one_integrator() -> None:
         else:
             high = omega
     z = -(1j * omega + a * np.exp(-1j * omega * e)) / b
-    answer = delay_margin([[0.0]], [[-b]], A_e=[[-a]], embedded_delay=e)
+    answer = DelayedLoop([[0.0]], [[-b]], A_e=[[-a]], embedded_delay=e).margin()
     assert answer.frequency == pytest.approx(omega, rel=1e-10)
     assert answer.delay == pytest.approx(-np.angle(z) % (2.0 * math.pi) / omega, rel=1e-10)
     assert answer.guaranteed
-    assert answer.delay != pytest.approx(delay_margin([[-a]], [[-b]]).delay, rel=1e-2)
+    assert answer.delay != pytest.approx(DelayedLoop([[-a]], [[-b]]).margin().delay, rel=1e-2)
 
 
 @pytest.mark.parametrize(("e", "count"), [(1.5, 0), (1.6, 2), (7.8, 2), (7.9, 4)])
 def test_roots_without_delay_have_the_embedded_one_in_place(e: float, count: int) -> None:
     """ẋ = −x(t − e) loses a pair at e = π/2 + 2πk."""
-    answer = delay_margin([[0.0]], [[-1e-3]], A_e=[[-1.0]], embedded_delay=e)
+    answer = DelayedLoop([[0.0]], [[-1e-3]], A_e=[[-1.0]], embedded_delay=e).margin()
     assert answer.unstable_roots == count
     assert (answer.delay > 0.0) == (count == 0)
 
 
 def test_without_an_embedded_part_or_its_delay_it_is_the_one_delay_loop() -> None:
     A_0, A_1, A_e = drive(0)
-    whole = delay_margin(A_0 + A_e, A_1)
-    none = delay_margin(A_0 + A_e, A_1, A_e=0.0 * A_e, embedded_delay=0.02)
-    at_once = delay_margin(A_0, A_1, A_e=A_e)
-    soon = delay_margin(A_0, A_1, A_e=A_e, embedded_delay=1e-9)
-    late = delay_margin(A_0, A_1, A_e=A_e, embedded_delay=2e-2)
+    whole = DelayedLoop(A_0 + A_e, A_1).margin()
+    none = DelayedLoop(A_0 + A_e, A_1, A_e=0.0 * A_e, embedded_delay=0.02).margin()
+    at_once = DelayedLoop(A_0, A_1, A_e=A_e).margin()
+    soon = DelayedLoop(A_0, A_1, A_e=A_e, embedded_delay=1e-9).margin()
+    late = DelayedLoop(A_0, A_1, A_e=A_e, embedded_delay=2e-2).margin()
     assert none.first_crossing == whole.first_crossing
     assert at_once.first_crossing == pytest.approx(whole.first_crossing, rel=1e-9)
     assert soon.first_crossing == pytest.approx(whole.first_crossing, rel=1e-6)
@@ -83,7 +83,7 @@ def test_without_an_embedded_part_or_its_delay_it_is_the_one_delay_loop() -> Non
 @pytest.mark.parametrize("seed", [0, 2, 3, 7, 8, 9])
 def test_crossing_and_count_agree_with_collocation(seed: int) -> None:
     loop, e = drive(seed), 0.01
-    answer = delay_margin(*loop[:2], A_e=loop[2], embedded_delay=e)
+    answer = DelayedLoop(*loop[:2], A_e=loop[2], embedded_delay=e).margin()
     start = collocated(*loop, 1e-7, e)
     assert int((start.real > 0.0).sum()) == answer.unstable_roots
     assert math.isfinite(answer.first_crossing)
@@ -91,16 +91,16 @@ def test_crossing_and_count_agree_with_collocation(seed: int) -> None:
     if answer.frequency * d < 30.0:
         assert np.abs(collocated(*loop, d, e) - root).min() < 1e-5 * abs(root)
         assert np.abs(collocated(*loop, 1.1 * d, e) - root).min() > 1e-4 * abs(root)
-    own = rightmost_roots(*loop[:2], d, A_e=loop[2], embedded_delay=e, count=12)
+    own = DelayedLoop(*loop[:2], A_e=loop[2], embedded_delay=e).roots(d, count=12)
     assert np.abs(own - root).min() < 1e-8 * abs(root)
 
 
 def test_unstable_count_grows_at_the_first_crossing() -> None:
     loop, e = drive(3), 0.01
-    answer = delay_margin(*loop[:2], A_e=loop[2], embedded_delay=e, horizon=0.5, confirm=True)
+    answer = DelayedLoop(*loop[:2], A_e=loop[2], embedded_delay=e).margin(horizon=0.5, confirm=True)
     for part in answer.intervals[:3]:
         middle = (part.lower + part.upper) / 2.0
-        roots = rightmost_roots(*loop[:2], middle, A_e=loop[2], embedded_delay=e, count=12)
+        roots = DelayedLoop(*loop[:2], A_e=loop[2], embedded_delay=e).roots(middle, count=12)
         assert int((roots.real > 0.0).sum()) == part.unstable_roots
 
 
@@ -111,41 +111,41 @@ def test_symmetries_are_divided_out_with_the_embedded_part() -> None:
         one[:4, :4] = part
     wide[0][4, :4] = 1.0
     free = np.eye(5)[:, [4]]
-    known = delay_margin(A_0, A_1, A_e=A_e, embedded_delay=0.01)
-    answer = delay_margin(*wide[:2], A_e=wide[2], embedded_delay=0.01, symmetries=free)
+    known = DelayedLoop(A_0, A_1, A_e=A_e, embedded_delay=0.01).margin()
+    answer = DelayedLoop(*wide[:2], A_e=wide[2], embedded_delay=0.01, symmetries=free).margin()
     assert answer.neutral == 1
     assert answer.delay == pytest.approx(known.delay, rel=1e-8)
     wide[2][4, 4] = -1.0
     with pytest.raises(SolverError, match="no symmetry of the loop"):
-        delay_margin(*wide[:2], A_e=wide[2], embedded_delay=0.01, symmetries=free)
+        DelayedLoop(*wide[:2], A_e=wide[2], embedded_delay=0.01, symmetries=free).margin()
 
 
 def test_an_embedded_part_of_zeros_is_none() -> None:
     A_0, A_1, A_e = drive(0)
-    none = delay_margin(A_0, A_1, A_e=0.0 * A_e, embedded_delay=0.01)
-    assert none.delay == delay_margin(A_0, A_1).delay
+    none = DelayedLoop(A_0, A_1, A_e=0.0 * A_e, embedded_delay=0.01).margin()
+    assert none.delay == DelayedLoop(A_0, A_1).margin().delay
 
 
 def test_embedded_part_is_checked() -> None:
     with pytest.raises(InputError, match="A_e has shape"):
-        delay_margin([[0.0]], [[-1.0]], A_e=[1.0], embedded_delay=0.1)
+        DelayedLoop([[0.0]], [[-1.0]], A_e=[1.0], embedded_delay=0.1).margin()
     with pytest.raises(InputError, match="without an A_e"):
-        delay_margin([[0.0]], [[-1.0]], embedded_delay=0.1)
+        DelayedLoop([[0.0]], [[-1.0]], embedded_delay=0.1).margin()
     with pytest.raises(InputError, match="embedded_delay is -0"):
-        delay_margin([[0.0]], [[-1.0]], A_e=[[1.0]], embedded_delay=-0.1)
+        DelayedLoop([[0.0]], [[-1.0]], A_e=[[1.0]], embedded_delay=-0.1).margin()
 
 
 def test_what_feeds_back_late_counts_without_delay_too():
     """ẋ = −x − 0.1 x(t − d) + 2 x(t − e) grows for any e."""
-    loop = {"A_0": [[-1.0]], "A_1": [[-0.1]], "embedded_delay": 1e-3}
-    grows = delay_margin(**loop, A_e=[[2.0]])
+    loop = {"A_0": [[-1.0]], "B": [[-0.1]], "embedded_delay": 1e-3}
+    grows = DelayedLoop(**loop, A_e=[[2.0]]).margin()
     assert (grows.delay, grows.unstable_roots) == (0.0, 1)
-    assert delay_margin(**loop, A_e=[[-2.0]]).unstable_roots == 0
+    assert DelayedLoop(**loop, A_e=[[-2.0]]).margin().unstable_roots == 0
 
 
 def test_roots_of_an_endless_embedded_delay_are_counted_and_not_listed() -> None:
     """A pair crosses at e = π/2 + 2πk: a list of them would need terabytes."""
-    answer = delay_margin([[0.0]], [[0.0]], A_e=[[-1.0]], embedded_delay=1e12)
+    answer = DelayedLoop([[0.0]], [[0.0]], A_e=[[-1.0]], embedded_delay=1e12).margin()
     assert answer.unstable_roots == pytest.approx(1e12 / np.pi, rel=1e-9)
-    answer = delay_margin([[0.0]], [[0.0]], A_e=[[-1.0]], embedded_delay=100.0)
+    answer = DelayedLoop([[0.0]], [[0.0]], A_e=[[-1.0]], embedded_delay=100.0).margin()
     assert answer.unstable_roots == 2 * np.ceil((100.0 - np.pi / 2) / (2.0 * np.pi))

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from sealag.errors import InputError, SolverError
-from sealag.margin import delay_margin, jitter_margin
+from sealag.margin import DelayedLoop
 
 
 def joint(B, D, k):
@@ -97,7 +97,7 @@ def delays(bound, step, A_0, B, C):
 
 def test_one_joint_has_the_passive_bound():
     """T = k s/(B s² + D s + k) peaks at D/k⁻¹: the margin is D/k, as Theorem 1 says."""
-    found = jitter_margin(*joint(0.1, 10.0, 100.0))
+    found = DelayedLoop(*joint(0.1, 10.0, 100.0)).jitter_margin()
     assert found.delay == pytest.approx(0.1, rel=2e-9)
     assert found.delay <= 0.1 <= found.upper * (1.0 + 1e-9)
     assert found.frequency == pytest.approx(math.sqrt(100.0 / 0.1), rel=1e-3)
@@ -105,10 +105,10 @@ def test_one_joint_has_the_passive_bound():
 
 def test_one_integrator_has_its_peak_above_all_roots():
     """ẋ = −k x(t − τ): T = k s/(s + k), so that d = 1/k; a constant delay may be π/2k."""
-    found = jitter_margin([[0.0]], [[1.0]], [[-4.0]])
+    found = DelayedLoop([[0.0]], [[1.0]], [[-4.0]]).jitter_margin()
     assert found.delay == pytest.approx(0.25, rel=2e-9)
     assert found.frequency == math.inf
-    assert delay_margin([[0.0]], [[-4.0]]).delay == pytest.approx(math.pi / 8)
+    assert DelayedLoop([[0.0]], [[-4.0]]).margin().delay == pytest.approx(math.pi / 8)
 
 
 @pytest.mark.parametrize("law", ["stiffness", "asymmetric", "pd", "links"])
@@ -116,7 +116,7 @@ def test_it_is_the_largest_gain_over_all_frequencies(law):
     rng = np.random.default_rng(3)
     for _ in range(10):
         A_0, B, C, _ = plant(rng, law=law)
-        found = jitter_margin(A_0, B, C)
+        found = DelayedLoop(A_0, B, C).jitter_margin()
         if found.unstable_roots:
             assert np.linalg.eigvals(A_0 + B @ C).real.max() > -1e-9
             continue
@@ -132,8 +132,8 @@ def test_it_lies_between_the_passive_bound_and_the_constant_margin(law):
     compared = 0
     for _ in range(60):
         A_0, B, C, passive = plant(rng, law=law)
-        found = jitter_margin(A_0, B, C)
-        constant = delay_margin(A_0, B @ C)
+        found = DelayedLoop(A_0, B, C).jitter_margin()
+        constant = DelayedLoop(A_0, B @ C).margin()
         assert found.unstable_roots == constant.unstable_roots
         if found.unstable_roots:
             assert found.delay == 0.0
@@ -149,7 +149,10 @@ def test_it_lies_between_the_passive_bound_and_the_constant_margin(law):
 @pytest.mark.parametrize("kind", ["longest", "sawtooth", "bang-bang", "greedy"])
 def test_no_delay_below_it_makes_the_loop_grow(seed, kind):
     A_0, B, C, _ = plant(np.random.default_rng(seed), law="stiffness")
-    found, slowest = jitter_margin(A_0, B, C), -np.linalg.eigvals(A_0 + B @ C).real.max()
+    found, slowest = (
+        DelayedLoop(A_0, B, C).jitter_margin(),
+        -np.linalg.eigvals(A_0 + B @ C).real.max(),
+    )
     step = found.delay / 60.0
     delay = delays(0.99 * found.delay, step, A_0, B, C)[kind]
     sizes = run(A_0, B, C, delay, step=step, time=min(12.0 / slowest, 4000 * step))
@@ -159,7 +162,7 @@ def test_no_delay_below_it_makes_the_loop_grow(seed, kind):
 def test_one_and_a_half_times_the_constant_margin_grows():
     """Negative control of the simulation."""
     A_0, B, C, _ = plant(np.random.default_rng(0), law="stiffness")
-    step = delay_margin(A_0, B @ C).delay / 60.0
+    step = DelayedLoop(A_0, B @ C).margin().delay / 60.0
     sizes = run(A_0, B, C, lambda t, past: 90, step=step, time=6000 * step)
     assert sizes[-200:].max() > 10.0 * sizes[:1000].max()
 
@@ -173,10 +176,14 @@ class TestEmbedded:
 
     def test_it_costs_and_vanishes_with_its_delay(self):
         A_0, B, C, A_e = self.loop()
-        without = jitter_margin(A_0 + A_e, B, C)
-        assert jitter_margin(A_0, B, C, A_e=A_e, embedded_delay=0.0).delay == without.delay
+        without = DelayedLoop(A_0 + A_e, B, C).jitter_margin()
+        assert (
+            DelayedLoop(A_0, B, C, A_e=A_e, embedded_delay=0.0).jitter_margin().delay
+            == without.delay
+        )
         found = [
-            jitter_margin(A_0, B, C, A_e=A_e, embedded_delay=e).delay for e in (1e-6, 0.005, 0.01)
+            DelayedLoop(A_0, B, C, A_e=A_e, embedded_delay=e).jitter_margin().delay
+            for e in (1e-6, 0.005, 0.01)
         ]
         assert found[0] == pytest.approx(without.delay, rel=1e-3)
         assert without.delay >= found[0] > found[1] > found[2] > 0.0
@@ -200,13 +207,13 @@ class TestEmbedded:
                 good = np.linalg.norm(scaled, 2, axis=(1, 2)).max() < 1.0
                 low, high = (d, high) if good else (low, d)
             best = max(best, low)
-        found = jitter_margin(A_0, B, C, A_e=A_e, embedded_delay=e).delay
+        found = DelayedLoop(A_0, B, C, A_e=A_e, embedded_delay=e).jitter_margin().delay
         assert found == pytest.approx(best, rel=2e-3)
 
     @pytest.mark.parametrize("period", [3, 7, 20, 53])
     def test_both_may_vary(self, period):
         A_0, B, C, A_e = self.loop()
-        found = jitter_margin(A_0, B, C, A_e=A_e, embedded_delay=0.01).delay
+        found = DelayedLoop(A_0, B, C, A_e=A_e, embedded_delay=0.01).jitter_margin().delay
         step = 1e-4
         sizes = run(
             A_0, B, C, lambda t, past: int(0.99 * found / step) * (round(t / step) // period % 2),
@@ -216,7 +223,7 @@ class TestEmbedded:
 
     def test_a_delay_that_is_too_long_proves_nothing(self):
         A_0, B, C, A_e = self.loop()
-        found = jitter_margin(A_0, B, C, A_e=A_e, embedded_delay=1.0)
+        found = DelayedLoop(A_0, B, C, A_e=A_e, embedded_delay=1.0).jitter_margin()
         assert found.delay == 0.0
         assert found.unstable_roots == 0
 
@@ -229,25 +236,27 @@ def test_symmetries_are_left_out():
     along = np.zeros((N + 2, 1))
     along[N] = 1.0
     none = np.zeros((2, B.shape[1]))
-    found = jitter_margin(wide, np.vstack([B, none]), np.hstack([C, none.T]), symmetries=along)
+    found = DelayedLoop(
+        wide, np.vstack([B, none]), np.hstack([C, none.T]), symmetries=along
+    ).jitter_margin()
     assert found.neutral == 2
-    assert found.delay == pytest.approx(jitter_margin(A_0, B, C).delay, rel=1e-8)
+    assert found.delay == pytest.approx(DelayedLoop(A_0, B, C).jitter_margin().delay, rel=1e-8)
 
 
 def test_what_is_unstable_has_none_and_what_is_not_late_has_no_end():
     A_0, B, C = joint(0.1, -1.0, 100.0)
-    assert jitter_margin(A_0, B, C).delay == 0.0
-    assert jitter_margin(A_0, B, C).unstable_roots == 2
+    assert DelayedLoop(A_0, B, C).jitter_margin().delay == 0.0
+    assert DelayedLoop(A_0, B, C).jitter_margin().unstable_roots == 2
     A_0, B, C = joint(0.1, 1.0, 0.0)
-    assert jitter_margin([[-1.0]], [[1.0]], [[0.0]]).delay == math.inf
-    assert jitter_margin([[-1.0]], [[0.0]], [[3.0]]).delay == math.inf
+    assert DelayedLoop([[-1.0]], [[1.0]], [[0.0]]).jitter_margin().delay == math.inf
+    assert DelayedLoop([[-1.0]], [[0.0]], [[3.0]]).jitter_margin().delay == math.inf
 
 
 def test_an_undamped_motion_beside_the_loop_counts_as_unstable():
     A_0 = np.zeros((3, 3))
     A_0[0, 0], A_0[1, 2], A_0[2, 1] = -1.0, 1.0, -4.0
     B, C = np.eye(3)[:, :1], -np.eye(3)[:1]
-    assert jitter_margin(A_0, B, C).unstable_roots == 2
+    assert DelayedLoop(A_0, B, C).jitter_margin().unstable_roots == 2
 
 
 @pytest.mark.parametrize(
@@ -265,10 +274,10 @@ def test_wrong_inputs_are_named(changes, words):
     A_0, B, C = joint(0.1, 10.0, 100.0)
     call = {"A_0": A_0, "B": B, "C": C, **changes}
     with pytest.raises(InputError, match=words):
-        jitter_margin(call.pop("A_0"), call.pop("B"), call.pop("C"), **call)
+        DelayedLoop(**call).jitter_margin()
 
 
 def test_a_direction_that_is_no_symmetry_is_refused():
     A_0, B, C = joint(0.1, 10.0, 100.0)
     with pytest.raises(SolverError, match="no symmetry"):
-        jitter_margin(A_0, B, C, symmetries=[[0.0], [1.0]])
+        DelayedLoop(A_0, B, C, symmetries=[[0.0], [1.0]]).jitter_margin()

@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import expm
 
 from sealag.errors import InputError
-from sealag.margin import delay_margin, jitter_margin, sampled_margin, sampled_radius
+from sealag.margin import DelayedLoop
 
 INTEGRATOR = ([[0.0]], [[1.0]])
 
@@ -58,7 +58,9 @@ def test_an_integrator_has_its_textbook_limits(periods_late, limit, gain):
     """z − 1 + kT = 0, z² − z + kT = 0, z³ − z² + kT = 0."""
     for share in (0.999, 1.001):
         T = share * limit / gain
-        radius = sampled_radius(*INTEGRATOR, [[-gain]], period=T, delay=periods_late * T)
+        radius = DelayedLoop(*INTEGRATOR, [[-gain]]).sampled_radius(
+            period=T, delay=periods_late * T
+        )
         assert (radius < 1.0) == (share < 1.0)
 
 
@@ -67,14 +69,14 @@ def test_the_radius_is_the_growth_of_a_simulation(delay):
     for period in (0.01, 0.04):
         A_0, B, C = spring_joint()
         sizes = simulated(A_0, B, C, period=period, delay=delay, periods=600)
-        radius = sampled_radius(A_0, B, C, period=period, delay=delay)
+        radius = DelayedLoop(A_0, B, C).sampled_radius(period=period, delay=delay)
         assert rate_of(sizes) == pytest.approx(radius, abs=2e-3)
 
 
 @pytest.mark.parametrize("period", [0.004, 0.02, 0.06])
 def test_a_simulation_decays_below_the_margin_and_grows_above(period):
     A_0, B, C = spring_joint()
-    found = sampled_margin(A_0, B, C, period=period)
+    found = DelayedLoop(A_0, B, C).sampled_margin(period=period)
     assert found.proven <= found.delay
     for share in (0.97, 1.03):
         sizes = simulated(A_0, B, C, period=period, delay=share * found.delay, periods=1500)
@@ -84,30 +86,32 @@ def test_a_simulation_decays_below_the_margin_and_grows_above(period):
 def test_fast_sampling_tends_to_the_continuous_margin():
     """A hold is half a period late on average."""
     A_0, B, C = spring_joint()
-    exact = delay_margin(A_0, B @ C).delay
-    lost = [exact - sampled_margin(A_0, B, C, period=T).delay for T in (0.02, 0.01, 0.005)]
+    exact = DelayedLoop(A_0, B @ C).margin().delay
+    lost = [
+        exact - DelayedLoop(A_0, B, C).sampled_margin(period=T).delay for T in (0.02, 0.01, 0.005)
+    ]
     np.testing.assert_allclose(lost, [0.01, 0.005, 0.0025], rtol=0.05)
 
 
 def test_up_to_the_jitter_margin_less_a_period_it_is_proven():
     A_0, B, C = spring_joint()
-    varying = jitter_margin(A_0, B, C).delay
-    assert sampled_margin(A_0, B, C, period=0.01).proven == varying - 0.01
-    assert sampled_margin(A_0, B, C, period=2.0 * varying).proven == 0.0
+    varying = DelayedLoop(A_0, B, C).jitter_margin().delay
+    assert DelayedLoop(A_0, B, C).sampled_margin(period=0.01).proven == varying - 0.01
+    assert DelayedLoop(A_0, B, C).sampled_margin(period=2.0 * varying).proven == 0.0
 
 
 def test_the_last_step_is_bisected():
     A_0, B, C = spring_joint()
-    found = sampled_margin(A_0, B, C, period=0.02)
-    assert sampled_radius(A_0, B, C, period=0.02, delay=found.delay) < 1.0
-    assert sampled_radius(A_0, B, C, period=0.02, delay=found.delay + 2e-6) > 1.0
+    found = DelayedLoop(A_0, B, C).sampled_margin(period=0.02)
+    assert DelayedLoop(A_0, B, C).sampled_radius(period=0.02, delay=found.delay) < 1.0
+    assert DelayedLoop(A_0, B, C).sampled_radius(period=0.02, delay=found.delay + 2e-6) > 1.0
 
 
 def test_ends():
-    assert sampled_margin([[-1.0]], [[1.0]], [[0.0]], period=0.1).delay == math.inf
-    assert sampled_margin([[1.0]], [[1.0]], [[0.5]], period=0.1).delay == 0.0
-    assert sampled_margin(*INTEGRATOR, [[-1.0]], period=2.1).delay == 0.0
-    slow = sampled_margin([[-1.0]], [[1.0]], [[-1.01]], period=1e-3)
+    assert DelayedLoop([[-1.0]], [[1.0]], [[0.0]]).sampled_margin(period=0.1).delay == math.inf
+    assert DelayedLoop([[1.0]], [[1.0]], [[0.5]]).sampled_margin(period=0.1).delay == 0.0
+    assert DelayedLoop(*INTEGRATOR, [[-1.0]]).sampled_margin(period=2.1).delay == 0.0
+    slow = DelayedLoop([[-1.0]], [[1.0]], [[-1.01]]).sampled_margin(period=1e-3)
     assert slow.delay is None
     assert slow.proven > 0.9
 
@@ -118,8 +122,10 @@ def test_symmetries_are_left_out():
     wide[:4, :4], wide[4, 5] = A_0, 1.0
     along = np.eye(6)[:, 4:5]
     both = np.vstack([B, np.zeros((2, 1))]), np.hstack([C, np.zeros((1, 2))])
-    found = sampled_radius(wide, *both, period=0.01, delay=0.01, symmetries=along)
-    assert found == pytest.approx(sampled_radius(A_0, B, C, period=0.01, delay=0.01), rel=1e-9)
+    found = DelayedLoop(wide, *both, symmetries=along).sampled_radius(period=0.01, delay=0.01)
+    assert found == pytest.approx(
+        DelayedLoop(A_0, B, C).sampled_radius(period=0.01, delay=0.01), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -129,4 +135,4 @@ def test_symmetries_are_left_out():
 )  # fmt: skip
 def test_wrong_times_are_named(period, delay, words):
     with pytest.raises(InputError, match=words):
-        sampled_radius(*INTEGRATOR, [[-1.0]], period=period, delay=delay)
+        DelayedLoop(*INTEGRATOR, [[-1.0]]).sampled_radius(period=period, delay=delay)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from humanoids2016 import random_sea_plant
-from sealag.margin import delay_margin, rightmost_roots
+from sealag.margin import DelayedLoop
 
 
 @pytest.mark.parametrize("excess", [1e-3, 1e-8, 1e-12, 2.0**-52])
 def test_slow_crossing_is_found(excess: float) -> None:
     """ẋ = −x − b x(t − d), b just above 1: ω² = b² − 1, cos ωd = −1/b."""
     b = 1.0 + excess
-    answer = delay_margin([[-1.0]], [[-b]])
+    answer = DelayedLoop([[-1.0]], [[-b]]).margin()
     omega = math.sqrt((b - 1.0) * (b + 1.0))
     assert answer.delay == pytest.approx((math.pi - math.atan(omega)) / omega, rel=1e-6)
     assert answer.guaranteed
@@ -22,24 +22,24 @@ def test_slow_crossing_is_found(excess: float) -> None:
 
 def test_touch_at_zero_frequency_takes_for_ever() -> None:
     for b in (1.0, 1.0 - 1e-8, 1.0 - 2.0**-53):
-        answer = delay_margin([[-1.0]], [[-b]])
+        answer = DelayedLoop([[-1.0]], [[-b]]).margin()
         assert (answer.delay, answer.crossings, answer.guaranteed) == (math.inf, (), True)
 
 
 def test_touch_that_rounding_cannot_tell_is_not_guaranteed() -> None:
     """Beside a symmetry the matrices are projected, and no longer exactly the user's."""
     rest = np.diag([-1.0, 0.0])
-    answer = delay_margin(rest, rest, symmetries=[[0.0], [1.0]])
+    answer = DelayedLoop(rest, rest, symmetries=[[0.0], [1.0]]).margin()
     assert answer.delay == math.inf
     assert not answer.guaranteed
-    assert delay_margin(rest, 0.999 * rest, symmetries=[[0.0], [1.0]]).guaranteed
+    assert DelayedLoop(rest, 0.999 * rest, symmetries=[[0.0], [1.0]]).margin().guaranteed
 
 
 @pytest.mark.parametrize("gap", [1e-4, 1e-8, 1e-12])
 def test_almost_unstable_loop_has_its_short_margin(gap: float) -> None:
     """ẋ = a x − x(t − d), a just below 1: ω² = 1 − a², cos ωd = a, so d → 1."""
     a = 1.0 - gap
-    answer = delay_margin([[a]], [[-1.0]])
+    answer = DelayedLoop([[a]], [[-1.0]]).margin()
     omega = math.sqrt((1.0 - a) * (1.0 + a))
     assert answer.unstable_roots == 0
     assert answer.delay == pytest.approx(math.atan2(omega, a) / omega, rel=1e-6)
@@ -49,7 +49,7 @@ def test_slow_crossing_survives_a_change_of_coordinates() -> None:
     b, fast = 1.0 + 1e-6, [3.0, 40.0, 200.0]
     T = np.random.default_rng(3).normal(size=(4, 4))
     A_0, A_1 = np.diag([-1.0, *(-f for f in fast)]), np.diag([-b, 0.1, 0.2, -0.3])
-    answer = delay_margin(*(np.linalg.solve(T, A @ T) for A in (A_0, A_1)))
+    answer = DelayedLoop(*(np.linalg.solve(T, A @ T) for A in (A_0, A_1))).margin()
     omega = math.sqrt(b * b - 1.0)
     assert answer.delay == pytest.approx(math.acos(-1.0 / b) / omega, rel=1e-6)
 
@@ -60,7 +60,7 @@ def test_crossings_that_almost_touch_have_directions(copies: int, excess: float)
     """ẍ + ẋ + b ẋ(t − d) + x = 0, b just above 1: (1 − ω²)² = (b² − 1) ω², two crossings."""
     b = 1.0 + excess
     loop = ([[0, 1], [-1, -1]], [[0, 0], [0, -b]])
-    answer = delay_margin(*(np.kron(np.eye(copies), A) for A in loop))
+    answer = DelayedLoop(*(np.kron(np.eye(copies), A) for A in loop)).margin()
     root = math.sqrt(b * b - 1.0)
     slow, fast = (math.sqrt(1.0 + root**2 / 4.0) + side * root / 2.0 for side in (-1.0, 1.0))
     found = sorted(answer.crossings, key=lambda crossing: crossing.frequency)
@@ -72,7 +72,7 @@ def test_crossings_that_almost_touch_have_directions(copies: int, excess: float)
 
 
 def test_what_almost_touches_from_the_other_side_has_no_crossing() -> None:
-    answer = delay_margin([[0, 1], [-1, -1]], [[0, 0], [0, -(1.0 - 1e-9)]])
+    answer = DelayedLoop([[0, 1], [-1, -1]], [[0, 0], [0, -(1.0 - 1e-9)]]).margin()
     assert (answer.delay, answer.guaranteed) == (math.inf, True)
 
 
@@ -112,7 +112,7 @@ def test_slow_root_beside_fast_ones_is_refined(seed: int, slow: float) -> None:
         np.diag([-1.5 * slow, 1.0, 2.0, -3.0, 4.0, -5.0]),
     )
     A_0, A_1 = (np.linalg.solve(T, A @ T) for A in loop)
-    answer = delay_margin(A_0, A_1)
+    answer = DelayedLoop(A_0, A_1).margin()
     assert answer.guaranteed
     assert len(answer.crossings) == 1
     omega = slow * math.sqrt(1.25)
@@ -123,7 +123,7 @@ def test_slow_root_beside_fast_ones_is_refined(seed: int, slow: float) -> None:
 @pytest.mark.parametrize(("seed", "count"), [(406, 3), (927, 4), (937, 4)])
 def test_crossing_of_a_soft_direction_is_refined(seed: int, count: int) -> None:
     plant = random_sea_plant(seed)
-    answer = delay_margin(plant.A_0, plant.A_1, symmetries=plant.symmetries)
+    answer = DelayedLoop(plant.A_0, plant.A_1, symmetries=plant.symmetries).margin()
     assert answer.guaranteed
     assert len(answer.crossings) == count
     one = answer.crossings[-1]
@@ -133,10 +133,10 @@ def test_crossing_of_a_soft_direction_is_refined(seed: int, count: int) -> None:
 
 def test_roots_confirm_the_margin_beside_a_slow_crossing() -> None:
     plant = random_sea_plant(927)
-    answer = delay_margin(plant.A_0, plant.A_1)
+    answer = DelayedLoop(plant.A_0, plant.A_1).margin()
     assert answer.unstable_roots == (np.linalg.eigvals(plant.A_0 + plant.A_1).real >= 0.0).sum()
     below, above = (
-        rightmost_roots(plant.A_0, plant.A_1, share * answer.delay)[0] for share in (0.999, 1.0)
+        DelayedLoop(plant.A_0, plant.A_1).roots(share * answer.delay)[0] for share in (0.999, 1.0)
     )
     assert below.real < 0.0
     assert above.real == pytest.approx(0.0, abs=1e-8)
@@ -147,7 +147,7 @@ def test_a_slow_crossing_ends_a_stable_range():
     """ẋ = a x − x(t − d), a = 1 − 1e-8: after 1 s, at a turn of 1.4e-4 rad, no zero root."""
     a = 1.0 - 1e-8
     omega = math.sqrt((1.0 - a) * (1.0 + a))
-    answer = delay_margin([[a]], [[-1.0]], horizon=3.0)
+    answer = DelayedLoop([[a]], [[-1.0]]).margin(horizon=3.0)
     assert answer.delay == pytest.approx(math.atan2(omega, a) / omega, rel=1e-7)
     assert [one.unstable_roots for one in answer.intervals] == [0, 2]
     assert answer.intervals[0].upper == answer.delay
@@ -156,6 +156,6 @@ def test_a_slow_crossing_ends_a_stable_range():
 
 def test_a_root_that_starts_on_the_axis_comes_back_after_a_period():
     """ẍ = −0.7 x − 0.3 x(t − d): ±j without delay, right at once, from the left again at 2π."""
-    answer = delay_margin([[0.0, 1.0], [-0.7, 0.0]], [[0.0, 0.0], [-0.3, 0.0]])
+    answer = DelayedLoop([[0.0, 1.0], [-0.7, 0.0]], [[0.0, 0.0], [-0.3, 0.0]]).margin()
     assert (answer.delay, answer.unstable_roots) == (0.0, 2)
     assert answer.first_crossing == pytest.approx(2.0 * math.pi)

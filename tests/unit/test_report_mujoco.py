@@ -15,13 +15,13 @@ from helpers.small_systems import arm_system, constant_delays
 from sealag.actuation import actuators
 from sealag.delay import Constant, Delays, Link, RoundTrip, Sinusoid, Table
 from sealag.errors import InputError
-from sealag.report import mujoco_model
+from sealag.report import MujocoModel
 from sealag.simulation import Clock, Exchanges, Network
 
 
 def _refused(system, *words, step=None):
     with pytest.raises(InputError) as caught:
-        mujoco_model(system, step=step)
+        MujocoModel.of(system, step=step)
     said = str(caught.value)
     assert [word for word in words if word not in said] == [], said
     assert said.endswith(".")
@@ -39,7 +39,7 @@ def _refused(system, *words, step=None):
 def test_the_step_is_the_longest_that_divides_all(tmp_path, up, down, embedded, tick, expected):
     delays = constant_delays(up, down, embedded, sample_time=tick)
     system = arm_system(tmp_path, delays=delays)
-    steps = mujoco_model(system).steps
+    steps = MujocoModel.of(system).steps
     assert (steps.step, steps.measurement, steps.command, steps.tick) == expected
     assert steps.total == pytest.approx(delays.d_1, abs=1e-12)
 
@@ -48,7 +48,7 @@ def test_stiff_springs_shorten_the_step_to_a_decimal_one(tmp_path):
     delays = constant_delays(0.002, 0.003, sample_time=0.001)
     stiff = {"spring_stiffness": 1e5, "rotor_inertia": 0.1}
     system = arm_system(tmp_path, delays=delays, springs=stiff)
-    steps = mujoco_model(system).steps
+    steps = MujocoModel.of(system).steps
     M = system.robot.mass_matrix(system.posture)
     fastest = np.sqrt(np.linalg.eigvals(np.linalg.inv(M) * 1e5).real.max() + 1e5 / 0.05)
     assert steps.step < 1.0 / fastest
@@ -65,8 +65,8 @@ def test_a_step_that_divides_no_delay_is_refused_with_one_that_does(tmp_path):
     delays = constant_delays(0.0, 0.0025, sample_time=0.001)
     system = arm_system(tmp_path, delays=delays)
     _refused(system, "delay of commands, 2.5 ms", "step 1 ms", "3 ms", "0.5 ms would do", step=1e-3)
-    assert mujoco_model(system, step=5e-4).steps.command == 5
-    assert mujoco_model(system, step=1e-4).steps.command == 25
+    assert MujocoModel.of(system, step=5e-4).steps.command == 5
+    assert MujocoModel.of(system, step=1e-4).steps.command == 25
     _refused(system, "at least 0.001 ms", "0.5 ms would do", step=0.0)
     _refused(system, "nan", step=float("nan"))
     _refused(system, "inf", step=float("inf"))
@@ -108,7 +108,7 @@ def test_delays_that_vary_are_refused(tmp_path, link, words):
     unheard = Delays(
         central=Constant(0.0), embedded=RoundTrip(up=link, down=WAY), sample_time=0.001
     )
-    assert mujoco_model(arm_system(tmp_path, delays=unheard)).steps.command == 2
+    assert MujocoModel.of(arm_system(tmp_path, delays=unheard)).steps.command == 2
 
 
 def test_an_embedded_period_rounds_each_hop_up_as_the_simulator_does(tmp_path):
@@ -119,7 +119,7 @@ def test_an_embedded_period_rounds_each_hop_up_as_the_simulator_does(tmp_path):
         sample_time=0.002,
         embedded_period=0.0005,
     )
-    steps = mujoco_model(arm_system(tmp_path, delays=delays)).steps
+    steps = MujocoModel.of(arm_system(tmp_path, delays=delays)).steps
     assert (steps.measurement_delay, steps.command_delay) == (0.0015, 0.002)
     clock = Clock(physics=1e-4, embedded=0.0005, central=0.002)
     plan = Exchanges.plan(Network.from_delays(delays), clock, duration=0.1, seed=1)
@@ -136,7 +136,7 @@ def test_drives_that_a_rotor_is_not_are_refused(tmp_path):
     late = constant_delays(0.001, 0.001, 0.002, sample_time=0.001, delayed_torque_feedback=True)
     _refused(arm_system(tmp_path, delays=late), "joint0", "delayed_torque_feedback")
     unshaped = arm_system(tmp_path, delays=late, springs={"inertia_shaping": 1.0})
-    assert mujoco_model(unshaped).steps.command == 2  # no torque is fed back
+    assert MujocoModel.of(unshaped).steps.command == 2  # no torque is fed back
 
 
 def test_mimic_joints_are_refused(tmp_path):
@@ -170,7 +170,7 @@ def test_bodies_that_mujoco_refuses_are_named(tmp_path):
 def test_rotors_have_shaped_inertia_damping_and_friction(tmp_path):
     springs = {"viscous_friction": 0.8, "coulomb_friction": np.array([2.0, 1.0])}
     system = arm_system(tmp_path, springs=springs)  # inertia_shaping = 0.5
-    root = ElementTree.fromstring(mujoco_model(system).text)
+    root = ElementTree.fromstring(MujocoModel.of(system).text)
     found = root.find(".//joint[@name='rotor of joint1']")
     assert found is not None
     values = {key: float(found.get(key, "nan")) for key in ("armature", "damping", "frictionloss")}
@@ -188,26 +188,26 @@ def test_names_are_written_as_xml(tmp_path):
         posture=arm.neutral(),
         springs={"spring_stiffness": 300.0, "rotor_inertia": 0.1, "motor_damping": 9.0},
     )
-    root = ElementTree.fromstring(mujoco_model(system).text)
+    root = ElementTree.fromstring(MujocoModel.of(system).text)
     assert [motor.get("name") for motor in root.iterfind("actuator/motor")] == ["<b-->"]
 
 
 def test_what_is_left_out_is_said(tmp_path):
-    said = " ".join(mujoco_model(sealag.load(EXAMPLES / "anymal.toml")).left_out)
+    said = " ".join(MujocoModel.of(sealag.load(EXAMPLES / "anymal.toml")).left_out)
     assert all(word in said for word in ("torque limits", "speed limits", "ground and friction"))
     system = arm_system(tmp_path)
     free = actuators(
         system.robot.joints, spring_stiffness=300.0, rotor_inertia=0.1, motor_damping=9.0
     )
-    assert mujoco_model(replace(system, actuators=free)).left_out == ()
+    assert MujocoModel.of(replace(system, actuators=free)).left_out == ()
     hume, prompt = sealag.load("bundled:hume"), constant_delays(0.002, 0.002)
     falling = replace(hume, delays=prompt, contacts=())
-    assert "no rest: the base floats" in " ".join(mujoco_model(falling).left_out)
+    assert "no rest: the base floats" in " ".join(MujocoModel.of(falling).left_out)
 
 
 def test_the_program_mujoco_is_not_needed(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    assert "<mujoco" in mujoco_model(arm_system(tmp_path)).text
+    assert "<mujoco" in MujocoModel.of(arm_system(tmp_path)).text
     project = tomllib.loads((EXAMPLES.parent / "pyproject.toml").read_text())["project"]
     assert not any("mujoco" in one for one in project["dependencies"])
     with pytest.raises(ImportError):  # the control

@@ -12,7 +12,6 @@ from helpers.designs import EXAMPLES
 from sealag.actuation import actuators
 from sealag.delay import Constant, Link
 from sealag.errors import InputError
-from sealag.margin import delay_margin, jitter_margin
 from sealag.simulation import Clock, Network, closed_loop
 from sealag.whole_body import Controller, LinkAngles, MotorAngles, StaticJoint
 
@@ -52,7 +51,7 @@ def test_the_whole_body_law_is_found_from_outside(name, signal):
     np.testing.assert_allclose(found.loop.A_0, inside.A_0, rtol=0.0, atol=1e-10 * size)
     assert found.memory < 5e-3  # the base follows the joints from tick to tick
     assert found.bend < 1e-3
-    one, other = (delay_margin(loop.A_0, loop.A_1) for loop in (found.loop, inside))
+    one, other = (loop.margin() for loop in (found.loop, inside))
     assert one.unstable_roots == other.unstable_roots
     if not one.unstable_roots:
         assert one.delay == pytest.approx(other.delay, rel=1e-4)
@@ -75,7 +74,7 @@ def test_textbook_margins_of_joint_pd(inertia, damping, k, margin, tmp_path):
     motors = stiff(robot.joints, inertia=inertia - 0.01, damping=damping)
     pd = JointPD(np.zeros(1), stiffness=k, motor=True)
     loop = sealag.freeze(pd, robot, motors, q=np.zeros(1)).loop
-    assert delay_margin(loop.A_0, loop.A_1).delay == pytest.approx(margin, rel=1e-2)
+    assert loop.margin().delay == pytest.approx(margin, rel=1e-2)
 
 
 class Feeling(JointPD):
@@ -119,8 +118,8 @@ def test_every_measured_quantity_has_its_column(arm):
 def test_the_simulator_agrees_just_below_and_just_above(share, arm):
     robot, motors, pd = arm
     loop = sealag.freeze(pd, robot, motors, q=np.zeros(2)).loop
-    margin = delay_margin(loop.A_0, loop.A_1).delay
-    assert jitter_margin(loop.A_0, loop.B, loop.C).delay < margin
+    margin = loop.margin().delay
+    assert loop.jitter_margin().delay < margin
     period = 1e-4
     way = Link(delay=Constant(value=share * margin))
     run = closed_loop(

@@ -8,7 +8,7 @@ import pytest
 from helpers.designs import EXAMPLES
 from helpers.small_systems import arm, arm_system, joint_task
 from sealag.design import load
-from sealag.margin import DelayMargin, delay_margin
+from sealag.margin import DelayedLoop
 from sealag.robot import Contact
 from sealag.whole_body import FrozenLoop, Law, LinkAngles, MotorAngles, StaticJoint
 
@@ -217,9 +217,9 @@ def test_contact_forces_are_part_of_the_links():
     joints see, 90.5 without any."""
     system = load(EXAMPLES / "anymal.toml")
     loop = system.frozen()
-    assert DelayMargin.of_loop(loop).delay == pytest.approx(87.4415e-3, abs=5e-8)
+    assert loop.margin().delay == pytest.approx(87.4415e-3, abs=5e-8)
     wrong = loop.A_0.copy()
     k = sum(name.startswith("z") for name in loop.states)
     links = slice(k + system.robot.n, 2 * k + system.robot.n)
     wrong[links, :k] *= 1.0 + 1e-3
-    assert abs(delay_margin(wrong, loop.A_1).delay - 87.4415e-3) > 1e-6
+    assert abs(DelayedLoop(wrong, loop.A_1).margin().delay - 87.4415e-3) > 1e-6

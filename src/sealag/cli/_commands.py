@@ -79,7 +79,7 @@ def _motion(system: System, path: Path | None) -> Motion | None:
     chosen = path or system.motion_file
     if chosen is None:
         return None
-    return design.load_motion(chosen, system.robot, contacts=system.contacts)
+    return system.load_motion(chosen)
 
 
 def _count(proofs: str) -> int:
@@ -227,10 +227,10 @@ def _sweep_rates(project: str, *, as_json: bool) -> None:
         return
     show("rate          largest delay   proven          the design's, without the hold")
     for rate in rates:
-        largest = "not lifted" if rate.margin.delay is None else time_text(rate.margin.delay)
+        largest = "not lifted" if rate.largest_s is None else time_text(rate.largest_s)
         verdict = {True: "stable", False: "unstable", None: "open"}[rate.stable]
         show(
-            f"{rate.rate_hz:7.1f} Hz    {largest:15} {time_text(rate.margin.proven):15} "
+            f"{rate.rate_hz:7.1f} Hz    {largest:15} {time_text(rate.proven_s):15} "
             f"{time_text(rate.way_s)}, {verdict}"
         )
     lost = [f"{rate.rate_hz:g}" for rate in rates if rate.stable is False]

@@ -8,7 +8,7 @@ from sealag.cli._json import show_json
 from sealag.cli._terminal import show
 from sealag.errors import InputError
 from sealag.files import Draft, check_output, write_text
-from sealag.report import MujocoModel, mujoco_model
+from sealag.report import MujocoModel
 from sealag.units import seconds_from_ms, time_text
 
 TARGET = "mujoco"
@@ -26,7 +26,7 @@ def export_project(
     with Draft(path) as draft:
         compile_kernels()
         step = None if step_ms is None else seconds_from_ms(step_ms)
-        model = mujoco_model(system, step=step)
+        model = MujocoModel.of(system, step=step)
         write_text(draft, model.text)
     if as_json:
         show_json({"file": str(path), **model.summary(), "design_s": system.delays.d_1})

@@ -1,7 +1,6 @@
 """The user's project file, motions in and out, and the certificate of a design."""
 
 from sealag.design._certify import certify
-from sealag.design._motion_file import load_motion
 from sealag.design._project import load
 from sealag.design._recheck import verify_design
 from sealag.design._simulate import simulate
@@ -12,7 +11,6 @@ __all__ = [
     "System",
     "certify",
     "load",
-    "load_motion",
     "simulate",
     "starter_project",
     "verify_design",

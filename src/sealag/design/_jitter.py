@@ -7,7 +7,6 @@ import numpy as np
 
 from sealag.design._local import Local
 from sealag.errors import SolverError
-from sealag.margin import jitter_margin
 from sealag.passivity import Basis, Place
 from sealag.typing import Array
 from sealag.whole_body import FrozenLoop
@@ -48,21 +47,10 @@ def jitter_along(along: "Along", bounds: Array, local: Local) -> float | None:
             return float(covered[k])
         searched += bool(covered[k])
         try:
-            least = min(least, *(_margin(loop) for loop in loops_at(along, k, local)))
+            least = min(least, *(loop.jitter_margin().delay for loop in loops_at(along, k, local)))
         except SolverError:
             return None
     return float(least)
-
-
-def _margin(loop: FrozenLoop) -> float:
-    return jitter_margin(
-        loop.A_0,
-        loop.B,
-        loop.C,
-        A_e=loop.A_e,
-        embedded_delay=loop.embedded_delay,
-        symmetries=loop.symmetries,
-    ).delay
 
 
 def loops_at(along: "Along", k: int, local: Local) -> Iterator[FrozenLoop]:

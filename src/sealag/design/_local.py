@@ -226,7 +226,7 @@ class _Decision:
             joint_damping=robot.damping,
         )
         try:
-            margin = DelayMargin.of_loop(loop, at_most=None if np.isinf(least) else least)
+            margin = loop.margin(at_most=None if np.isinf(least) else least)
         except SolverError:
             self._found(k, Basis.OPEN, np.nan)
             return
@@ -278,7 +278,7 @@ class _Decision:
                     "another posture"
                 )
             else:
-                margin = DelayMargin.of_loop(loop)
+                margin = loop.margin()
         except (ContractionError, SolverError) as error:
             problem = problem or str(error)
         return _Known(margin=margin, loop=loop, at=at, rest=state, problem=problem)

@@ -10,7 +10,6 @@ import numpy as np
 from sealag.design._criteria import bounds_along
 from sealag.design._jitter import jitter_along
 from sealag.errors import ContractionError, InputError, SolverError
-from sealag.margin import DelayMargin
 from sealag.passivity import Basis, Criterion
 from sealag.robot import Motion
 
@@ -61,15 +60,20 @@ class LocalMargins:
     def summary(self) -> dict[str, Any]:
         """Return everything as JSON says it: "unbounded" for a time that no delay reaches, None for
         what is not known."""
-        plain = {key: _stated(value) for key, value in asdict(self).items()}
+        plain = {key: stated(value) for key, value in asdict(self).items()}
         plain["intervals"] = [
-            {"from_s": shortest, "to_s": _stated(longest), "unstable_roots": count}
+            {"from_s": shortest, "to_s": stated(longest), "unstable_roots": count}
             for shortest, longest, count in self.intervals
         ]
         return plain
 
 
-def _stated(value: Any) -> Any:
+def stated(value: Any) -> Any:
+    """Return a time as JSON says it: "unbounded" where no delay is too long.
+
+    Args:
+        value: s, or anything else, which stays.
+    """
     return "unbounded" if isinstance(value, float) and math.isinf(value) else value
 
 
@@ -93,7 +97,7 @@ def local_margins(system: "System", motion: Motion | None, horizon: float | None
     if margin is None:
         raise SolverError(local.problem)
     if horizon is not None:
-        margin = DelayMargin.of_loop(loop, horizon=horizon)
+        margin = loop.margin(horizon=horizon)
     motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
     size = np.abs(margin.mode[motors]) if len(margin.mode) else np.zeros(len(motors))
     shares = size / max(float(size.sum()), 1e-300)

@@ -29,26 +29,12 @@ _CSV_BLOCK = 10_000  # rows that are lists of Python numbers at a time
 
 
 def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] = ()) -> Motion:
-    """Read a motion from a CSV, NPZ or Parquet file with one named column each.
-
-    Columns: `time_s`; for a floating base `base_x … base_z` (m) and `base_qx … base_qw`; one for
-    each joint by its name (rad or m). Optional: `<joint>:velocity` for all joints together with
-    `base_vx … base_wz` in the base frame, else velocities are differences of configurations; and
-    `contact:<frame>` with 1 where the project's contact at this frame holds, else all hold.
+    """Read what `System.load_motion` reads.
 
     Args:
-        path: the file; its ending tells the format.
+        path: the file.
         robot: whose motion it is.
-        contacts: the project's contacts.
-
-    Returns:
-        The motion.
-
-    Raises:
-        FileError: the file cannot be read.
-        MotionError: a column is unknown, missing or holds no real numbers, a row is not finite,
-            time does not increase, a quaternion is not one, a joint is outside its limits, a
-            contact is neither 0 nor 1, or only some velocities are given.
+        contacts: those that hold or not.
     """
     path = Path(path)
     table = _read_table(path)

@@ -1,14 +1,13 @@
 """What a sample rate costs: sampled and held loops of one design."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from sealag.design._criteria import bounds_along
 from sealag.design._jitter import loops_at
+from sealag.design._margins import stated
 from sealag.errors import ContractionError, InputError
-from sealag.margin import SampledMargin, sampled_margin
 from sealag.passivity import Criterion
 
 if TYPE_CHECKING:
@@ -25,26 +24,27 @@ class Rate:
     Attributes:
         rate_hz: of the central controller.
         way_s: the design's delay at that rate, without the hold, s.
-        margin: largest constant delay beside the hold.
+        largest_s: largest constant delay beside the hold that was found stable, s; None where more
+            commands wait than can be lifted.
+        proven_s: constant delays up to here are stable for sure, s.
         stable: whether the sampled loop is stable at that delay and all that were tried below; None
             if it is too large to be tried.
     """
 
     rate_hz: float
     way_s: float
-    margin: SampledMargin
+    largest_s: float | None
+    proven_s: float
     stable: bool | None
 
     def summary(self) -> dict[str, Any]:
         """Return everything as JSON says it."""
-        largest = self.margin.delay
-        unbounded = largest is not None and math.isinf(largest)
         return {
             "rate_hz": self.rate_hz,
             "way_s": self.way_s,
             "stable": self.stable,
-            "largest_delay_s": "unbounded" if unbounded else largest,
-            "proven_s": "unbounded" if math.isinf(self.margin.proven) else self.margin.proven,
+            "largest_delay_s": stated(self.largest_s),
+            "proven_s": stated(self.proven_s),
         }
 
 
@@ -72,13 +72,18 @@ def rate_sweep(system: "System", rates: Sequence[float]) -> tuple[Rate, ...]:
     for rate in sorted(asked):
         period = 1.0 / rate
         way = replace(system.delays, sample_time=period).d_1 - period
-        margins = [
-            sampled_margin(loop.A_0, loop.B, loop.C, period=period, symmetries=loop.symmetries)
-            for loop in loops
-        ]
+        margins = [loop.sampled_margin(period) for loop in loops]
         margin = min(margins, key=lambda one: one.proven if one.delay is None else one.delay)
         stable = True if way <= (margin.delay or margin.proven) else None
         if margin.delay is not None:
             stable = way <= margin.delay
-        found.append(Rate(rate_hz=rate, way_s=way, margin=margin, stable=stable))
+        found.append(
+            Rate(
+                rate_hz=rate,
+                way_s=way,
+                largest_s=margin.delay,
+                proven_s=margin.proven,
+                stable=stable,
+            )
+        )
     return tuple(found)

@@ -13,7 +13,7 @@ from sealag.delay import Delays
 from sealag.design._along import Along
 from sealag.design._criteria import certified_bounds
 from sealag.design._margins import LocalMargins, local_margins
-from sealag.design._motion_file import save_motion
+from sealag.design._motion_file import load_motion, save_motion
 from sealag.design._rates import RATES, Rate, rate_sweep
 from sealag.design._schema import Project, SimulationSection
 from sealag.errors import InputError, either
@@ -152,6 +152,29 @@ class System:
             contact_index=np.zeros(1, dtype=np.int64),
         )
 
+    def load_motion(self, path: str | Path) -> Motion:
+        """Read a motion from a CSV, NPZ or Parquet file with one named column each.
+
+        Columns: `time_s`; for a floating base `base_x … base_z` (m) and `base_qx … base_qw`; one
+        for each joint by its name (rad or m). Optional: `<joint>:velocity` for all joints together
+        with `base_vx … base_wz` in the base frame, else velocities are differences of
+        configurations; and `contact:<frame>` with 1 where the design's contact at this frame holds,
+        else all hold.
+
+        Args:
+            path: the file; its ending tells the format.
+
+        Returns:
+            The motion.
+
+        Raises:
+            FileError: the file cannot be read.
+            MotionError: a column is unknown, missing or holds no real numbers, a row is not finite,
+                time does not increase, a quaternion is not one, a joint is outside its limits, a
+                contact is neither 0 nor 1, or only some velocities are given.
+        """
+        return load_motion(path, self.robot, contacts=self.contacts)
+
     def save_motion(self, motion: Motion, path: str | Path) -> None:
         """Write a motion of the robot as CSV, NPZ or Parquet through a temporary name.
 
@@ -252,7 +275,7 @@ class System:
             InputError: as `certify` raises it.
         """
         if not isinstance(motion, Motion | None):
-            raise InputError(f"motion is {motion!r}; load_motion makes a Motion of a file.")
+            raise InputError(f"motion is {motion!r}; System.load_motion makes a Motion of a file.")
         if motion is not None and len(motion) > MOST_INSTANTS:
             raise InputError(
                 f"The motion has {len(motion)} instants; a certificate holds {MOST_INSTANTS} at "

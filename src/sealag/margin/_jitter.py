@@ -6,16 +6,13 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from sealag.errors import InputError, SolverError
+from sealag.errors import SolverError
 from sealag.margin._loop import (
     Loop,
     eigenvalues_with_error,
-    parts_of,
-    prepare,
-    real_numbers,
     roots_at_once,
 )
-from sealag.typing import Array, ArrayLike
+from sealag.typing import Array
 
 _RANK = 1e-13
 """Share of the largest singular value of C below which a direction carries no command."""
@@ -50,52 +47,13 @@ class JitterMargin:
     neutral: int
 
 
-def jitter_margin(
-    A_0: ArrayLike,
-    B: ArrayLike,
-    C: ArrayLike,
-    *,
-    A_e: ArrayLike | None = None,
-    embedded_delay: float = 0.0,
-    symmetries: ArrayLike | None = None,
-) -> JitterMargin:
-    """Jitter margin of ẋ = A_0 x + B C x(t − τ(t)) + A_e x(t − ε(t)); docs/theory section 7.4.
-
-    Broken at y = R x with C = L R, the loop is y − y(t − τ) = w, w = Δ ẏ with
-    Δv = ∫_{t−τ(t)}^{t} v ds and ‖Δ‖ ≤ d in L2 for 0 ≤ τ(t) ≤ d (Kao and Lincoln, Automatica 2004).
-    One τ for all of y commutes with constant matrices. With A = A_0 + B C + A_e and
-
-        T(s) = s R (s − A)⁻¹ B L ,
-
-    the loop is stable for every such τ if A is Hurwitz and d ‖X^½ T X^-½‖_∞ < 1 for some X ≻ 0. The
-    break is at the singular values of C, C = U Σ Vᵀ, L = U Σ^½, R = Σ^½ Vᵀ, and X = I there. Where
-    C = −F with F symmetric, that is X = F⁻¹ at the command.
-
-    The norm is the level of which no eigenvalue of a Hamiltonian matrix is on the imaginary axis
-    beyond rounding (Bruinsma and Steinbuch, 1990), bracketed to 1e-9. A_e, late by at most its own
-    ε ≤ e, is a second Δ with a multiplier of its own, and varies as it likes too.
-
-    Cost: an eigenvalue problem of 2 n a step, three or four steps: 10 ms for 36 states, 0.3 s for
-    76.
+def jitter_margin(loop: Loop, broken: "Broken") -> JitterMargin:
+    """Bound `DelayedLoop.jitter_margin`.
 
     Args:
-        A_0: (n, n) undelayed part, 1/s.
-        B: (n, m) what the command does.
-        C: (m, n) the command of a state.
-        A_e: (n, n) part with the embedded delay, 1/s; None for none.
-        embedded_delay: e, s.
-        symmetries: (n, s) columns v along which nothing acts, as `delay_margin` takes them.
-
-    Returns:
-        The margin. delay ≤ that of `delay_margin`, which is of constant delays only.
-
-    Raises:
-        InputError: matrices do not fit or are not finite real numbers, or a time is negative.
-        SolverError: a matrix moves a symmetry, or rounding leaves the norm open.
+        loop: the prepared loop.
+        broken: it, broken where it is late.
     """
-    loop, broken = broken_at(
-        A_0, B, C, A_e=A_e, embedded_delay=embedded_delay, symmetries=symmetries
-    )
     unstable = roots_at_once(loop.A_0 + loop.A_1 + loop.A_e)[0] if len(loop.A_0) else 0
     found = _Bound(0.0, 0.0, math.nan)
     if not unstable:
@@ -104,45 +62,6 @@ def jitter_margin(
         delay=found.delay, upper=found.upper, frequency=found.frequency, unstable_roots=unstable,
         neutral=loop.neutral,
     )  # fmt: skip
-
-
-def broken_at(
-    A_0: ArrayLike,
-    B: ArrayLike,
-    C: ArrayLike,
-    *,
-    A_e: ArrayLike | None = None,
-    embedded_delay: float = 0.0,
-    symmetries: ArrayLike | None = None,
-) -> "tuple[Loop, Broken]":
-    """Check the matrices of a loop, take its symmetries out, and break it where it is late.
-
-    Args:
-        A_0: (n, n) undelayed part.
-        B: (n, m) what the command does.
-        C: (m, n) the command of a state.
-        A_e: (n, n) part with the embedded delay; None for none.
-        embedded_delay: that delay, s.
-        symmetries: (n, s) columns along which nothing acts.
-
-    Raises:
-        InputError: a matrix does not fit.
-        SolverError: a matrix moves a symmetry.
-    """
-    before, after = (
-        real_numbers(name, value, what="a matrix of real numbers")
-        for name, value in (("B", B), ("C", C))
-    )
-    size, m = len(parts_of(A_0, A_0, A_e, embedded_delay)[0]), len(after)
-    if before.shape != (size, m) or after.shape != (m, size):
-        raise InputError(
-            f"B is {before.shape} and C {after.shape}; A_0 of {size} states needs ({size}, m) and "
-            f"(m, {size})."
-        )
-    loop = prepare(
-        A_0, before @ after, A_e=A_e, embedded_delay=embedded_delay, symmetries=symmetries
-    )
-    return loop, Broken.of(loop, before, after)
 
 
 class _Bound(NamedTuple):

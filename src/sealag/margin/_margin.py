@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,28 +12,21 @@ from sealag.margin._crossings import Crossing, Found, crossings_of
 from sealag.margin._loop import (
     Loop,
     has_zero_root,
-    prepare,
     roots_at_once,
     time_of,
     undamped_whatever_the_delay,
 )
 from sealag.margin._pictures import Picture, Turn, frequency_of
-from sealag.margin._roots import loop_roots, rightmost_roots
+from sealag.margin._roots import loop_roots
 from sealag.margin._search import search
-from sealag.typing import Array, ArrayLike
+from sealag.typing import Array
 from sealag.units import in_ms
-
-if TYPE_CHECKING:
-    from sealag.whole_body import FrozenLoop
 
 _RESIDUAL = 1e-9
 _AT = 1e-9
 _MOST_IF_UNSTABLE = 3_000
 """Samples spent on the first crossing of an unstable loop. Robots need tens to hundreds; ten times
 more take half a minute for zero roots that hide the crossings."""
-_DRIFT = 1e-9
-"""1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
-_MOST_DRIFTING = 8  # zero roots that are counted
 _MOST_LISTED = 10_000
 """Crossings listed up to a horizon. Ten times more are 10 MB of JSON that nobody reads; ten times
 fewer refuse a stiff loop over a few of its slowest periods."""
@@ -95,94 +88,29 @@ class DelayMargin:
     residual: float
     method: str
 
-    @classmethod
-    def of_loop(cls, loop: "FrozenLoop", **choices: Any) -> "DelayMargin":
-        """Return the exact margin of a robot's frozen loop; see `delay_margin`.
 
-        Where compensation cancels gravity, what is left of a zero root is the rounding of the
-        loop's entries: a root without delay that is no further than that from the axis is not
-        stable.
-
-        Args:
-            loop: the loop.
-            choices: further arguments of `delay_margin`.
-        """
-        parts: dict[str, Any] = {
-            "A_e": loop.A_e,
-            "embedded_delay": loop.embedded_delay,
-            "symmetries": loop.symmetries,
-        }
-        found = delay_margin(loop.A_0, loop.A_1, **parts, **choices)
-        if found.unstable_roots or not len(loop.A_0):
-            return found
-        roots = rightmost_roots(loop.A_0, loop.A_1, 0.0, count=_MOST_DRIFTING, **parts)
-        drifting = int((roots.real > -_DRIFT).sum())
-        if not drifting:
-            return found
-        return replace(found, delay=0.0, unstable_roots=drifting, guaranteed=False)
-
-
-def delay_margin(
-    A_0: ArrayLike,
-    A_1: ArrayLike,
+def exact_margin(
+    loop: Loop,
     *,
-    A_e: ArrayLike | None = None,
-    embedded_delay: float = 0.0,
-    symmetries: ArrayLike | None = None,
-    at_most: float | None = None,
-    intervals: bool = False,
-    horizon: float | None = None,
-    confirm: bool = False,
+    at_most: float | None,
+    intervals: bool,
+    horizon: float | None,
+    confirm: bool,
 ) -> DelayMargin:
-    """Exact margin of ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e), constant d; docs/theory section 7.
-
-    A root jω with z = e^{-jωd} solves det(jω − A_0 − z A_1 − A_e e^{-jωe}) = 0. Without A_e the
-    eigenvalues of A_0 + e^{-jφ} A_1 are enclosed over half a turn φ; with it those of
-    G(jω) = C (jω − A_0 − z_0 A_1 − A_e e^{-jωe})⁻¹ B, A_1 = B C, over ω. Intervals are excluded, or
-    hold eigenvalues that each meet |z| = 1 at most once and are refined by Newton's method; a band
-    that nothing explains raises. Necessary and sufficient for the frozen loop. A root that touches
-    the axis only at zero frequency does so after an infinite delay: never; where rounding cannot
-    tell, the sign of det(A_0 − A_1) in rational arithmetic does.
-
-    One delay is enough for a law that feeds back a stiffness: its signal passes the ways up and
-    down once each, so that only their sum d_1 moves roots; the feedforward's d_2, the way down,
-    moves none. Torque feedback that waits for its own way up is A_e with its fixed delay e. Delays
-    that vary are not covered.
-
-    Cost: an n × n eigenvalue problem a sample, and a few samples a crossing. On one core some 30 ms
-    for 36 states of a robot, 0.2 s for a dense A_1 with n = 50 and 6 s with n = 150, more with many
-    crossings. With A_e 0.1 to 1 s already for 8 states, the more the lighter the damping.
+    """Decide `DelayedLoop.margin`.
 
     Args:
-        A_0: (n, n) undelayed part, 1/s.
-        A_1: (n, n) delayed part, 1/s.
-        A_e: (n, n) part with the fixed delay, 1/s; None for none.
-        embedded_delay: that delay e, s.
-        symmetries: (n, s) columns v with A_0 v = A_1 v = A_e v = 0; they and the chains A_0 y = v,
-            A_1 y = A_e y = 0 that belong to them are divided out before anything is computed.
-        at_most: longest delay of interest, s: later crossings are left out, which is much faster;
-            None for all.
-        intervals: whether to list the ranges of delay with their numbers of unstable roots.
-        horizon: longest delay listed in intervals, s, which asks for them too; None for twenty
-            periods of the slowest crossing.
-        confirm: whether to count the roots at zero delay and on both sides of the margin by an
-            independent method (Chebyshev collocation) too.
-
-    Returns:
-        The margin.
-
-    Raises:
-        InputError: matrices do not fit or are not finite real numbers, a time is negative or not
-            finite, or roots cross more often before the horizon than can be listed.
-        SolverError: A_0, A_1 or A_e moves a symmetry, a band could be neither excluded nor
-            explained, or a check contradicts the answer.
+        loop: the prepared loop.
+        at_most: longest delay of interest, s.
+        intervals: whether to list ranges of delay.
+        horizon: longest delay listed, s.
+        confirm: whether to count roots by collocation too.
     """
     if horizon is not None and time_of("horizon", horizon) == 0.0:
         raise InputError("horizon is 0 s; a positive time is needed.")
     if at_most is not None and (intervals or horizon is not None):
         raise InputError("at_most leaves crossings out that intervals need; give one of the two.")
     longest = math.inf if at_most is None else time_of("at_most", at_most)
-    loop = prepare(A_0, A_1, symmetries=symmetries, A_e=A_e, embedded_delay=embedded_delay)
     answer = _margin(loop, longest=longest)
     if intervals or horizon is not None:
         answer = replace(answer, intervals=_intervals(answer, horizon=horizon))

@@ -2,52 +2,10 @@
 
 import numpy as np
 
-from sealag.errors import InputError
-from sealag.margin._loop import EPS, Loop, prepare, time_of
-from sealag.typing import Array, ArrayLike
+from sealag.margin._loop import EPS, Loop
+from sealag.typing import Array
 
 _MOST_NODES = 120
-
-
-def rightmost_roots(
-    A_0: ArrayLike,
-    A_1: ArrayLike,
-    delay: float,
-    *,
-    A_e: ArrayLike | None = None,
-    embedded_delay: float = 0.0,
-    count: int = 1,
-    nodes: int = 24,
-    symmetries: ArrayLike | None = None,
-) -> Array:
-    """Rightmost roots of det(λ − A_0 − A_1 e^{-λd} − A_e e^{-λe}) = 0.
-
-    The generator of the solution semigroup is discretised on Chebyshev nodes over the longer delay,
-    in two pieces where there are two delays (Breda, Maset & Vermiglio), for the signals that act
-    late only. Every root is refined by Newton's method on the characteristic equation. Independent
-    of `delay_margin`; a heuristic where `nodes` resolve too little.
-
-    Args:
-        A_0: (n, n) undelayed part, 1/s.
-        A_1: (n, n) delayed part, 1/s.
-        delay: d, s, constant.
-        A_e: (n, n) part with the fixed delay, 1/s; None for none.
-        embedded_delay: that delay e, s.
-        count: how many roots.
-        nodes: Chebyshev nodes over the delay; doubled until the roots stand still.
-        symmetries: (n, s) neutral directions to leave out, as in `delay_margin`.
-
-    Returns:
-        (count,) complex roots by decreasing real part; fewer if the loop has fewer.
-
-    Raises:
-        InputError: a matrix cannot be used, or the delay is negative or not finite.
-    """
-    delay = time_of("delay", delay)
-    if count < 1 or nodes < 4:
-        raise InputError(f"count is {count} and nodes {nodes}; at least 1 and 4 are needed.")
-    loop = prepare(A_0, A_1, symmetries=symmetries, A_e=A_e, embedded_delay=embedded_delay)
-    return loop_roots(loop, delay, count=count, nodes=nodes)
 
 
 def loop_roots(loop: Loop, delay: float, *, count: int, nodes: int = 24) -> Array:

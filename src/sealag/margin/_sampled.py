@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.margin._jitter import broken_at, jitter_margin
 from sealag.margin._loop import time_of
-from sealag.typing import Array, ArrayLike
+from sealag.typing import Array
 
 _LARGEST = 500
 """States and waiting commands of one lifted loop. Its eigenvalues take a fifth of a second; ten
@@ -41,91 +41,8 @@ class SampledMargin:
     proven: float
 
 
-def sampled_radius(
-    A_0: ArrayLike,
-    B: ArrayLike,
-    C: ArrayLike,
-    *,
-    period: float,
-    delay: float,
-    symmetries: ArrayLike | None = None,
-) -> float:
-    """Spectral radius of ẋ = A_0 x + B u with u(t) = C x(kT) held on kT + d ≤ t < (k + 1) T + d.
-
-    Exact: with d = m T + r, 0 ≤ r < T,
-
-        x_{k+1} = Φ x_k + Γ_new u_{k−m} + Γ_old u_{k−m−1} ,   Φ = e^{A_0 T} ,
-        Γ_new = ∫_0^{T−r} e^{A_0 s} ds B ,   Γ_old = e^{A_0 (T−r)} ∫_0^r e^{A_0 s} ds B
-
-    on x_k and the m + 1 commands that wait. The loop is stable if and only if it is less than 1.
-
-    Args:
-        A_0: (n, n) undelayed part, 1/s.
-        B: (n, m) what the command does.
-        C: (m, n) the command of a state.
-        period: T, s.
-        delay: d of measurement, computation and command together, s; the hold comes on top.
-        symmetries: (n, s) columns along which nothing acts, as `delay_margin` takes them.
-
-    Raises:
-        InputError: matrices do not fit, a time is no time, or more commands wait than can be
-            lifted.
-        SolverError: a matrix moves a symmetry.
-    """
-    return _Held.of(A_0, B, C, period=period, symmetries=symmetries).radius(time_of("delay", delay))
-
-
-def sampled_margin(
-    A_0: ArrayLike,
-    B: ArrayLike,
-    C: ArrayLike,
-    *,
-    period: float,
-    symmetries: ArrayLike | None = None,
-) -> SampledMargin:
-    """Find the largest constant delay of a sampled and held loop; docs/theory section 7.6.
-
-    A hold is a delay that grows from d to d + T and falls back: up to the jitter margin less T the
-    loop is stable for sure. From there delays are tried, eight in a period, until one is unstable,
-    and the last step is bisected.
-
-    Args:
-        A_0: (n, n) undelayed part, 1/s.
-        B: (n, m) what the command does.
-        C: (m, n) the command of a state.
-        period: T, s.
-        symmetries: (n, s) columns along which nothing acts, as `delay_margin` takes them.
-
-    Returns:
-        The margin.
-
-    Raises:
-        InputError: matrices do not fit or the period is no time.
-        SolverError: a matrix moves a symmetry, or rounding leaves the jitter margin open.
-    """
-    held = _Held.of(A_0, B, C, period=period, symmetries=symmetries)
-    varying = jitter_margin(A_0, B, C, symmetries=symmetries)
-    if math.isinf(varying.delay):
-        return SampledMargin(period=period, delay=math.inf, proven=math.inf)
-    proven = max(0.0, varying.delay - period)
-    if held.size(proven) > _LARGEST:
-        return SampledMargin(period=period, delay=None, proven=proven)
-    low, step = proven, period / _STEPS
-    if not held.stable(low):
-        return SampledMargin(period=period, delay=0.0, proven=0.0)
-    while held.stable(low + step):
-        low += step
-        if held.size(low + step) > _LARGEST:
-            return SampledMargin(period=period, delay=None, proven=proven)
-    high = low + step
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if held.stable(middle) else (low, middle)
-    return SampledMargin(period=period, delay=low, proven=proven)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Held:
+class Held:
     """A loop without symmetries, ẋ = A x + left u, and what is sampled of it, right x."""
 
     A: Array
@@ -134,15 +51,44 @@ class _Held:
     period: float
 
     @classmethod
-    def of(
-        cls, A_0: ArrayLike, B: ArrayLike, C: ArrayLike, *, period: float,
-        symmetries: ArrayLike | None,
-    ) -> "_Held":  # fmt: skip
+    def of(cls, A: Array, left: Array, right: Array, *, period: float) -> Self:
+        """Check the period.
+
+        Args:
+            A: (n, n) undelayed part, 1/s.
+            left: (n, r) what a held signal does.
+            right: (r, n) the signals.
+            period: T, s.
+        """
         T = time_of("period", period)
         if T == 0.0:
             raise InputError("period is 0 s; a positive time is needed.")
-        loop, broken = broken_at(A_0, B, C, symmetries=symmetries)
-        return cls(A=loop.A_0, left=broken.left, right=broken.right, period=T)
+        return cls(A=A, left=left, right=right, period=T)
+
+    def margin(self, varying: float) -> SampledMargin:
+        """Find the largest delay beside the hold.
+
+        Args:
+            varying: jitter margin of the loop, s.
+        """
+        period = self.period
+        if math.isinf(varying):
+            return SampledMargin(period=period, delay=math.inf, proven=math.inf)
+        proven = max(0.0, varying - period)
+        if self.size(proven) > _LARGEST:
+            return SampledMargin(period=period, delay=None, proven=proven)
+        low, step = proven, period / _STEPS
+        if not self.stable(low):
+            return SampledMargin(period=period, delay=0.0, proven=0.0)
+        while self.stable(low + step):
+            low += step
+            if self.size(low + step) > _LARGEST:
+                return SampledMargin(period=period, delay=None, proven=proven)
+        high = low + step
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2.0
+            low, high = (middle, high) if self.stable(middle) else (low, middle)
+        return SampledMargin(period=period, delay=low, proven=proven)
 
     def size(self, delay: float) -> int:
         """States and waiting commands."""

@@ -2,13 +2,12 @@
 
 from sealag.report._mcap import McapRecorder
 from sealag.report._mcap_reader import read_recording
-from sealag.report._mujoco import MujocoModel, mujoco_model
+from sealag.report._mujoco import MujocoModel
 from sealag.report._recording import write_run
 
 __all__ = [
     "McapRecorder",
     "MujocoModel",
-    "mujoco_model",
     "read_recording",
     "write_run",
 ]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -55,6 +55,69 @@ class MujocoModel:
     steps: StepCounts
     left_out: tuple[str, ...]
 
+    @classmethod
+    def of(cls, system: System, *, step: float | None = None) -> Self:
+        """Write a design's robot, drives and delays as a MuJoCo model.
+
+        Rotors are joints of their own with armature B_s and damping D_θ + β b_v, springs are
+        tendons K (θ − q) + D_s (θ̇ − q̇) between rotor and joint, Eqs. (6), (8); motors act on
+        rotors. Motors are late by both ways down, sensors by the way up, the hold is the caller's
+        (docs/theory section 15). Contacts are equalities where the posture has them, active as
+        certificates assume. The keyframe is where the loop rests.
+
+        Args:
+            system: the design.
+            step: MuJoCo's time step, s; the longest that divides delays and period and resolves the
+                springs if None.
+
+        Returns:
+            The model. The program MuJoCo is not needed.
+
+        Raises:
+            InputError: a delay varies, packets are lost, a step divides a delay not or is too long,
+                a drive has a bandwidth or late torque feedback, a joint mimics another, or a body
+                has an inertia that MuJoCo refuses.
+        """
+        _require_representable(system)
+        drives = system.actuators
+        link_rate, _ = drives.fastest_link(system.robot, system.posture)
+        motor_rate = np.sqrt((drives.spring_stiffness / drives.shaped_inertia).max())
+        longest = min(
+            LONGEST_STEP, 1.0 / (STEPS_PER_RADIAN * float(np.hypot(link_rate, motor_rate)))
+        )
+        steps = StepCounts.of(system.delays, longest=longest, step=step)
+        rest = system.rest()
+        file = Element("mujoco", model=system.name)
+        file.append(ElementTree.Comment(_about(system, steps)))
+        SubElement(
+            file,
+            "compiler",
+            angle="radian",
+            boundmass="0",
+            boundinertia="0",
+            balanceinertia="false",
+        )
+        SubElement(
+            file, "option", timestep=repr(steps.step), integrator="implicitfast",
+            gravity=_numbers([0.0, 0.0, -GRAVITY]),
+        )  # fmt: skip
+        world = SubElement(file, "worldbody")
+        order = _links(system, world)
+        _rotors(system, world)
+        _springs(system, SubElement(file, "tendon"))
+        if system.contacts:
+            _contacts(system, world, SubElement(file, "equality"))
+        late = _late(steps.command_delay, steps.command)
+        motors = SubElement(file, "actuator")
+        for name in drives.joints:
+            SubElement(motors, "motor", {"name": name, "joint": _rotor(name), **late})
+        late = _late(steps.measurement_delay, steps.measurement)
+        _sensors(system, SubElement(file, "sensor"), late)
+        SubElement(file, "keyframe").append(_key(system, order, rest))
+        ElementTree.indent(file)
+        text = ElementTree.tostring(file, encoding="unicode") + "\n"
+        return cls(text=text, steps=steps, left_out=tuple(_left_out(system, rest.reason)))
+
     def summary(self) -> dict[str, Any]:
         """Return what the JSON answer holds, times in s."""
         steps = self.steps
@@ -69,62 +132,6 @@ class MujocoModel:
             "total_s": steps.total,
             "left_out": list(self.left_out),
         }
-
-
-def mujoco_model(system: System, *, step: float | None = None) -> MujocoModel:
-    """Write a design's robot, drives and delays as a MuJoCo model.
-
-    Rotors are joints of their own with armature B_s and damping D_θ + β b_v, springs are tendons
-    K (θ − q) + D_s (θ̇ − q̇) between rotor and joint, Eqs. (6), (8); motors act on rotors. Motors are
-    late by both ways down, sensors by the way up, the hold is the caller's (docs/theory section
-    15). Contacts are equalities where the posture has them, active as certificates assume. The
-    keyframe is where the loop rests.
-
-    Args:
-        system: the design.
-        step: MuJoCo's time step, s; the longest that divides delays and period and resolves the
-            springs if None.
-
-    Returns:
-        The model. The program MuJoCo is not needed.
-
-    Raises:
-        InputError: a delay varies, packets are lost, a step divides a delay not or is too long, a
-            drive has a bandwidth or late torque feedback, a joint mimics another, or a body has an
-            inertia that MuJoCo refuses.
-    """
-    _require_representable(system)
-    drives = system.actuators
-    link_rate, _ = drives.fastest_link(system.robot, system.posture)
-    motor_rate = np.sqrt((drives.spring_stiffness / drives.shaped_inertia).max())
-    longest = min(LONGEST_STEP, 1.0 / (STEPS_PER_RADIAN * float(np.hypot(link_rate, motor_rate))))
-    steps = StepCounts.of(system.delays, longest=longest, step=step)
-    rest = system.rest()
-    file = Element("mujoco", model=system.name)
-    file.append(ElementTree.Comment(_about(system, steps)))
-    SubElement(
-        file, "compiler", angle="radian", boundmass="0", boundinertia="0", balanceinertia="false"
-    )
-    SubElement(
-        file, "option", timestep=repr(steps.step), integrator="implicitfast",
-        gravity=_numbers([0.0, 0.0, -GRAVITY]),
-    )  # fmt: skip
-    world = SubElement(file, "worldbody")
-    order = _links(system, world)
-    _rotors(system, world)
-    _springs(system, SubElement(file, "tendon"))
-    if system.contacts:
-        _contacts(system, world, SubElement(file, "equality"))
-    late = _late(steps.command_delay, steps.command)
-    motors = SubElement(file, "actuator")
-    for name in drives.joints:
-        SubElement(motors, "motor", {"name": name, "joint": _rotor(name), **late})
-    late = _late(steps.measurement_delay, steps.measurement)
-    _sensors(system, SubElement(file, "sensor"), late)
-    SubElement(file, "keyframe").append(_key(system, order, rest))
-    ElementTree.indent(file)
-    text = ElementTree.tostring(file, encoding="unicode") + "\n"
-    return MujocoModel(text=text, steps=steps, left_out=tuple(_left_out(system, rest.reason)))
 
 
 def _require_representable(system: System) -> None:

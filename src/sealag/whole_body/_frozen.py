@@ -1,11 +1,12 @@
 """The frozen closed loop at one configuration: one law and one plant, contacts eliminated."""
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from sealag.actuation import Actuators
+from sealag.margin import DelayedLoop, DelayMargin
 from sealag.robot import Contact, Robot
 from sealag.typing import Array
 from sealag.whole_body._evaluation import LawEvaluation
@@ -21,6 +22,11 @@ differences leave 1e-9 where it feels none; a task that feels one feels it with 
 _KNOWN = 1e-9
 """Share of the law's and the links' stiffness that central differences leave open: a motion that is
 held by less is held by nothing."""
+
+
+_DRIFT = 1e-9
+"""1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
+_MOST_DRIFTING = 8  # zero roots that are counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +100,7 @@ class Memory:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FrozenLoop:
+class FrozenLoop(DelayedLoop):
     """ẋ = A_0 x + B C x(t − d) + A_e x(t − e) about a rest, x = [z, θ, ż, θ̇, τ_m, ξ].
 
     z are coordinates along the motions that contacts leave free, δq = Z z, without conserved
@@ -112,19 +118,33 @@ class FrozenLoop:
         bend: share of the law's derivative that changes within the distance asked for, `beside`.
     """
 
+    # what a loop may leave out, a frozen one always has: by keyword, without a default
     A_0: Array
     B: Array
-    C: Array
-    A_e: Array
-    embedded_delay: float
+    C: Array  # pyright: ignore[reportGeneralTypeIssues]
+    A_e: Array  # pyright: ignore[reportGeneralTypeIssues]
+    embedded_delay: float  # pyright: ignore[reportGeneralTypeIssues]
     states: tuple[str, ...]
-    symmetries: Array
+    symmetries: Array  # pyright: ignore[reportGeneralTypeIssues]
     bend: float = 0.0
 
-    @property
-    def A_1(self) -> Array:
-        """(N, N) the law's part, late by d."""
-        return self.B @ self.C
+    def margin(self, **choices: Any) -> DelayMargin:
+        """Exact margin of a robot's loop; see `DelayedLoop.margin`.
+
+        Where compensation cancels gravity, what is left of a zero root is the rounding of the
+        loop's entries: a root without delay that is no further than that from the axis is not
+        stable.
+
+        Args:
+            choices: as `DelayedLoop.margin` takes them.
+        """
+        found = DelayedLoop.margin(self, **choices)
+        if found.unstable_roots or not len(self.A_0):
+            return found
+        drifting = int((self.roots(0.0, count=_MOST_DRIFTING).real > -_DRIFT).sum())
+        if not drifting:
+            return found
+        return replace(found, delay=0.0, unstable_roots=drifting, guaranteed=False)
 
     @classmethod
     def of(

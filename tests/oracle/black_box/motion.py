@@ -9,7 +9,6 @@ import sealag
 from oracle.black_box.box import BlackBox, Both
 from oracle.black_box.compare import AGREEMENT, Verdict, number, same
 from oracle.black_box.roots import ScanLost
-from sealag.design import load_motion
 
 BASE = ["base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw"]
 
@@ -60,7 +59,7 @@ def compare_motion(path: Path, csv: Path) -> Verdict:
     middle = start
     try:
         system = sealag.load(path)
-        motion = load_motion(csv, system.robot, contacts=system.contacts)
+        motion = system.load_motion(csv)
         found = sealag.certify(system, motion, proofs=1)
     except sealag.SealagError as error:
         return verdict("refused", " ".join(str(error).split()))
