@@ -98,7 +98,7 @@ def test_uses_in_code_are_found():
 
 
 def test_uses_in_documentation_are_found():
-    text = "`sealag.passivity.max_delay(J)`\n    from sealag.margin import a, b\n    sealag.loadx"
+    text = "`sealag.passivity.max_delay(J)`\n    from sealag.margin import a, b\n    sealag.load(x)"
     assert set(_uses_in_text(text)) >= {
         ("sealag.passivity", "max_delay"),
         ("sealag.margin", "a"),

@@ -75,7 +75,7 @@ def decided(system, motion, *, share=1.0, refuse=False):
     """What is known, with bounds that are scaled, or taken away."""
     bounds = system.certified_bounds(system.spaces(motion))
     delay = 0.0 * bounds.delay if refuse else share * bounds.delay
-    return system.along(motion).local(delay), bounds
+    return system.local(delay, motion), bounds
 
 
 @pytest.mark.parametrize("gravity", ["feedback", "planned"])
@@ -109,7 +109,7 @@ def test_bounds_that_are_too_long_hide_the_critical_instant(tmp_path):
     whole, bounds = decided(system, motion, refuse=True)
     wrong = bounds.delay.copy()
     wrong[whole.critical] *= 100.0
-    hidden = system.along(motion).local(wrong)
+    hidden = system.local(wrong, motion)
     assert hidden.critical != whole.critical
     assert hidden.margin_s > whole.margin_s
 

@@ -3,18 +3,14 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
-from sealag.design._local import Local, local_of
+from sealag.design._design import Design
 from sealag.robot import Motion
 from sealag.store import blocks, release
-from sealag.typing import Array
-from sealag.whole_body import Rest, Spaces
-
-if TYPE_CHECKING:
-    from sealag.design._system import System
+from sealag.whole_body import Spaces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +22,18 @@ class Along:
         motion: its instants.
     """
 
-    system: "System"
+    system: Design
     motion: Motion
+
+    @classmethod
+    def of(cls, system: Design, motion: Motion | None = None) -> Self:
+        """Take a design along a motion.
+
+        Args:
+            system: the design.
+            motion: its instants; the posture if None.
+        """
+        return cls(system=system, motion=system.still() if motion is None else motion)
 
     @cached_property
     def _first(self) -> Spaces:
@@ -57,12 +63,3 @@ class Along:
         if not len(chosen) or chosen[-1] < len(self._first):
             return self._first.at(instants)
         return self.system.spaces(self.motion.at(chosen.tolist())).at(order.tolist())
-
-    def local(self, bounds: Array, rest: Rest | None = None) -> Local:
-        """Decide stability and margin of the law that runs at every instant.
-
-        Args:
-            bounds: (N,) of the certified criterion, s; 0 where it decides nothing.
-            rest: where the loop of the first instant rests, if that is known already.
-        """
-        return local_of(self, bounds, rest)

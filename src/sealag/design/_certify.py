@@ -7,6 +7,7 @@ from importlib.metadata import version
 import numpy as np
 from threadpoolctl import threadpool_info
 
+from sealag.design._along import Along
 from sealag.design._assumptions import assumptions_of
 from sealag.design._criteria import (
     bounds_along,
@@ -15,7 +16,7 @@ from sealag.design._criteria import (
     prove_instants,
     time_varying_bound,
 )
-from sealag.design._local import Local
+from sealag.design._local import Local, local_of
 from sealag.design._system import PROOF_COUNT, System
 from sealag.passivity import (
     Answer,
@@ -139,7 +140,7 @@ def certify(
         UnknownNameError: a frame or joint does not exist.
     """
     kind = system.criterion_asked(motion, criterion, time_varying=time_varying, proofs=proofs)
-    along = system.along(motion)
+    along = Along.of(system, motion)
     motion = along.motion
     rest = system.rest(motion) if len(motion) == 1 else None
     bounds = bounds_along(along, kind, rest=rest, published=True, solver=solver)
@@ -158,7 +159,7 @@ def certify(
     )
     withdrawn = proven is not bound
     decided = np.zeros(len(motion)) if printed else bound.delay
-    local = along.local(decided, rest)
+    local = local_of(along, decided, rest)
     if (
         rest is not None and rest.found and local.loop is None
     ):  # a law that cannot run rests nowhere

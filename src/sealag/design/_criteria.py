@@ -3,11 +3,12 @@ the published one ((29), (31))."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sealag import passivity
+from sealag.design._along import Along
+from sealag.design._design import Design
 from sealag.errors import SolverError
 from sealag.passivity import Bound, Criterion, InstantProof, Problem, Solver, solve
 from sealag.robot import Motion
@@ -15,10 +16,6 @@ from sealag.store import Store, release
 from sealag.typing import Array, BoolArray
 from sealag.units import time_text
 from sealag.whole_body import Rest, Spaces, StiffnessForm, TaskError
-
-if TYPE_CHECKING:
-    from sealag.design._along import Along
-    from sealag.design._system import System
 
 ASYMMETRY_TOLERANCE = 1e-7
 """Relative asymmetry up to which a stiffness counts as symmetric: rounding, and the error of the
@@ -38,7 +35,7 @@ rank."""
 
 
 def certified_bounds(
-    spaces: Spaces, system: "System", rest: Rest | None, motion: Motion | None
+    spaces: Spaces, system: Design, rest: Rest | None, motion: Motion | None
 ) -> Bound:
     """Bound every instant as `System.certified_bounds` says.
 
@@ -71,7 +68,7 @@ class BoundsAlong:
 
 
 def bounds_along(
-    along: "Along",
+    along: Along,
     kind: Criterion,
     *,
     rest: Rest | None = None,
@@ -111,7 +108,7 @@ def bounds_along(
     )
 
 
-def _unconditional(spaces: Spaces, system: "System") -> Bound:
+def _unconditional(spaces: Spaces, system: Design) -> Bound:
     """The bound of each instant if no condition failed."""
     F = delayed_stiffness(spaces, system, Criterion.CERTIFIED)
     problem = Problem.of_stiffness(F, system.actuators.motor_damping)
@@ -131,7 +128,7 @@ class Conditions:
         load: (N, n) torque that gravity needs, Nm.
     """
 
-    system: "System"
+    system: Design
     contraction: Array
     asymmetry: Array
     singular: BoolArray
@@ -139,7 +136,7 @@ class Conditions:
     load: Array
 
     @classmethod
-    def room(cls, system: "System", count: int) -> "Conditions":
+    def room(cls, system: Design, count: int) -> "Conditions":
         """Return room for what is measured at some instants, to be filled by `put`.
 
         Args:
@@ -240,7 +237,7 @@ class Conditions:
         )
 
 
-def _drive_refusals(system: "System") -> Iterator[str]:
+def _drive_refusals(system: Design) -> Iterator[str]:
     """Why drives that are late are covered by no passive bound (docs/theory section 14)."""
     slow = np.flatnonzero(np.isfinite(system.actuators.torque_bandwidth))
     if len(slow):
@@ -258,7 +255,7 @@ def _drive_refusals(system: "System") -> Iterator[str]:
         )
 
 
-def _asymmetry_source(system: "System") -> str:
+def _asymmetry_source(system: Design) -> str:
     """What makes a stiffness asymmetric."""
     if system.law.stiffness_form is StiffnessForm.PUBLISHED:
         return "the stiffness Λ K_x"
@@ -272,7 +269,7 @@ def _semidefinite(F: Array) -> Array:
     return values[:, 0] >= -1e-9 * np.maximum(np.abs(values).max(axis=1), 1e-300)
 
 
-def task_stiffness(spaces: Spaces, system: "System", kind: Criterion) -> Array:
+def task_stiffness(spaces: Spaces, system: Design, kind: Criterion) -> Array:
     """Return the task stiffness S that a criterion uses, (N, m, m).
 
     Args:
@@ -287,7 +284,7 @@ def task_stiffness(spaces: Spaces, system: "System", kind: Criterion) -> Array:
     return spaces.Lambda @ spaces.K_x
 
 
-def delayed_stiffness(spaces: Spaces, system: "System", kind: Criterion) -> Array:
+def delayed_stiffness(spaces: Spaces, system: Design, kind: Criterion) -> Array:
     """Return the motor-side stiffness F that a criterion uses, (N, n, n), Nm/rad.
 
     Args:
@@ -301,7 +298,7 @@ def delayed_stiffness(spaces: Spaces, system: "System", kind: Criterion) -> Arra
     return np.swapaxes(spaces.J_star, -1, -2) @ S @ spaces.J_star
 
 
-def published_bounds(spaces: Spaces, system: "System", *, solver: Solver | None = None) -> Bound:
+def published_bounds(spaces: Spaces, system: Design, *, solver: Solver | None = None) -> Bound:
     """Bound every instant by (29), or by (31) for several priority levels, as printed.
 
     Args:
@@ -349,7 +346,7 @@ def time_varying_bound(bound: Bound, motion: Motion, *, solver: Solver | None = 
 
 
 def prove_instants(
-    along: "Along",
+    along: Along,
     bound: Bound,
     *,
     kind: Criterion,

@@ -1,25 +1,22 @@
 """The largest delay that may vary as it likes, over all instants of a motion."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sealag.design._along import Along
 from sealag.design._local import Local
 from sealag.errors import SolverError
 from sealag.passivity import Basis, Place
 from sealag.typing import Array
 from sealag.whole_body import FrozenLoop
 
-if TYPE_CHECKING:
-    from sealag.design._along import Along
-
 _MOST = 100
 """Instants in a minimum of their potential whose jitter margin is computed; then the next passive
 bound is the answer, less by the percents by which both differ. Ten times more take a minute."""
 
 
-def jitter_along(along: "Along", bounds: Array, local: Local) -> float | None:
+def jitter_along(along: Along, bounds: Array, local: Local) -> float | None:
     """Largest delay at which every instant is stable however the delay varies below it, s.
 
     What is passive at a delay is so however it varies: an instant in a minimum of its potential
@@ -53,7 +50,7 @@ def jitter_along(along: "Along", bounds: Array, local: Local) -> float | None:
     return float(least)
 
 
-def loops_at(along: "Along", k: int, local: Local) -> Iterator[FrozenLoop]:
+def loops_at(along: Along, k: int, local: Local) -> Iterator[FrozenLoop]:
     """The loops of an instant: in its posture and, where the law sags, where it rests."""
     system, motion = along.system, along.motion
     posture = system.in_posture(motion, k)

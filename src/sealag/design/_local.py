@@ -1,11 +1,11 @@
 """Stability and delay margin of the law that runs, decided over all instants of a motion."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sealag.design._along import Along
 from sealag.design._criteria import ASYMMETRY_TOLERANCE
 from sealag.errors import ContractionError, SolverError
 from sealag.margin import DelayMargin
@@ -13,9 +13,6 @@ from sealag.passivity import Basis, LocalLoop, Place
 from sealag.robot import Contact
 from sealag.typing import Array, BoolArray, IntArray
 from sealag.whole_body import FrozenLoop, Rest
-
-if TYPE_CHECKING:
-    from sealag.design._along import Along
 
 MOST_EXACT = 600
 """Instants of a motion that are decided exactly at most; a bound decides the others, or none."""
@@ -125,7 +122,7 @@ class Local:
         return int((self.basis == basis).sum())
 
 
-def local_of(along: "Along", bounds: Array, rest: Rest | None = None) -> Local:
+def local_of(along: Along, bounds: Array, rest: Rest | None = None) -> Local:
     """Decide stability and margin of the law that runs at every instant of a motion.
 
     Each instant is a loop that holds the instant's configuration. It is frozen in that
@@ -173,7 +170,7 @@ class _Known:
 class _Decision:
     """The decision over a motion, instant by instant."""
 
-    def __init__(self, along: "Along", bounds: Array, first: Rest | None) -> None:
+    def __init__(self, along: Along, bounds: Array, first: Rest | None) -> None:
         self._along, self._bounds, self._first = along, bounds, first
         self._system, self._motion = along.system, along.motion
         count = len(self._motion)

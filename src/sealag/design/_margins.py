@@ -3,18 +3,16 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from sealag.design._along import Along
 from sealag.design._criteria import bounds_along
 from sealag.design._jitter import jitter_along
+from sealag.design._local import local_of
 from sealag.errors import ContractionError, InputError, SolverError
 from sealag.passivity import Basis, Criterion
-from sealag.robot import Motion
-
-if TYPE_CHECKING:
-    from sealag.design._system import System
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,20 +75,18 @@ def stated(value: Any) -> Any:
     return "unbounded" if isinstance(value, float) and math.isinf(value) else value
 
 
-def local_margins(system: "System", motion: Motion | None, horizon: float | None) -> LocalMargins:
+def local_margins(along: Along, horizon: float | None) -> LocalMargins:
     """Decide what `System.local_margins` returns.
 
     Args:
-        system: the design.
-        motion: the motion; the system's posture if None.
+        along: the design and its motion.
         horizon: longest delay of the ranges that are listed, s; None for none.
     """
     if horizon is not None and not (math.isfinite(horizon) and horizon > 0.0):
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
-    along = system.along(motion)
-    motion = along.motion
+    system, motion = along.system, along.motion
     bounds = bounds_along(along, Criterion.CERTIFIED).bound.delay
-    local = along.local(bounds)
+    local = local_of(along, bounds)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
         raise ContractionError(local.problem)

@@ -19,9 +19,10 @@ from sealag.delay import (
     Sinusoid,
     Table,
 )
+from sealag.design._design import Source
 from sealag.design._plain_words import first_problem
 from sealag.design._schema import AXES, Project, SamplesDelay
-from sealag.design._system import Source, System
+from sealag.design._system import System
 from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError
 from sealag.files import bundled, read_whole

@@ -2,16 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from sealag.design._along import Along
 from sealag.design._criteria import bounds_along
+from sealag.design._design import Design
 from sealag.design._jitter import loops_at
+from sealag.design._local import local_of
 from sealag.design._margins import stated
 from sealag.errors import ContractionError, InputError
 from sealag.passivity import Criterion
-
-if TYPE_CHECKING:
-    from sealag.design._system import System
 
 RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0)
 """Hz, of a sweep if nothing else is asked for."""
@@ -48,15 +48,15 @@ class Rate:
         }
 
 
-def rate_sweep(system: "System", rates: Sequence[float]) -> tuple[Rate, ...]:
+def rate_sweep(system: Design, rates: Sequence[float]) -> tuple[Rate, ...]:
     """Return what `System.rate_sweep` does.
 
     Args:
         system: the design.
         rates: Hz.
     """
-    along = system.along()
-    local = along.local(bounds_along(along, Criterion.CERTIFIED).bound.delay)
+    along = Along.of(system)
+    local = local_of(along, bounds_along(along, Criterion.CERTIFIED).bound.delay)
     if local.loop is None:
         raise ContractionError(local.problem)
     loops = list(loops_at(along, 0, local))

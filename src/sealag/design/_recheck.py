@@ -90,7 +90,7 @@ def _recomputed(claimed: Certificate, system: System, motion: Motion | None) -> 
     yield _versions(claimed.answer.versions, fresh.answer.versions)
     if not np.array_equal(claimed.evidence.time_s, fresh.evidence.time_s):
         return
-    along = system.along(motion)
+    along = Along.of(system, motion)
     F = delayed_stiffness(along.at([proof.instant for proof in proofs]), system, kind)
     for proof, found in zip(proofs, F, strict=True):
         yield _matrices(proof, fresh.evidence.proof_of(proof.instant), found)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sealag.design._design import Design
 from sealag.design._schema import SCENARIOS
-from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.robot import ContactKind
 from sealag.simulation import Clock, Foot, Network, Push, Run, Scene, closed_loop
@@ -32,7 +32,7 @@ _SPOT_SPEED = 1e-3  # m/s
 
 
 def simulate(
-    system: System,
+    system: Design,
     *,
     scenario: str | None = None,
     duration: float | None = None,
@@ -112,7 +112,7 @@ def simulate(
     return _with_delay_storage(run, system, held)
 
 
-def _start(system: System, kind: str, held: Array) -> tuple[Array, Array | None]:
+def _start(system: Design, kind: str, held: Array) -> tuple[Array, Array | None]:
     """First configuration and motor angles: where the loop that holds a posture rests, if it does;
     for a drop above the ground, or with springs that do not yet carry the joints."""
     if kind == "drop" and not system.robot.floating_base:
@@ -125,7 +125,7 @@ def _start(system: System, kind: str, held: Array) -> tuple[Array, Array | None]
     return (rest.q, rest.theta) if rest.found else (q, None)
 
 
-def _with_delay_storage(run: Run, system: System, q: Array) -> Run:
+def _with_delay_storage(run: Run, system: Design, q: Array) -> Run:
     """Add V_4 with the multiplier that certifies the held posture, if one does."""
     if run.audit.controller_side is None or len(run.time) < 3:
         return run
@@ -145,7 +145,7 @@ def _on_the_spot(walking: Walking) -> Walking:
     return replace(walking, gait=gait, ground=GroundProfile.flat())
 
 
-def _walk(system: System, walking: Walking, pushes: Sequence[Push], common: dict[str, Any]) -> Run:
+def _walk(system: Design, walking: Walking, pushes: Sequence[Push], common: dict[str, Any]) -> Run:
     start = walking.begin(system.robot, system.actuators, period=common["clock"].central)
     return closed_loop(
         system.robot,
@@ -167,7 +167,7 @@ class _Tracking:
         self.reset, self.tick = controller.reset, controller.tick
 
 
-def _controller(system: System, kind: str, q: Array) -> TickController:
+def _controller(system: Design, kind: str, q: Array) -> TickController:
     """The design's controller, holding where it stands or tracking about it."""
     if kind != "track":
         return system.controller(q)
@@ -181,7 +181,7 @@ def _controller(system: System, kind: str, q: Array) -> TickController:
     return _Tracking(system.controller(q, reference=wave))
 
 
-def _feet(system: System) -> list[Foot]:
+def _feet(system: Design) -> list[Foot]:
     setting = system.simulation
     return [
         Foot(
@@ -199,7 +199,7 @@ def _feet(system: System) -> list[Foot]:
     ]
 
 
-def _pushes(system: System, kind: str) -> list[Push]:
+def _pushes(system: Design, kind: str) -> list[Push]:
     pushes = [
         Push(
             frame=push.frame,
@@ -217,7 +217,7 @@ def _pushes(system: System, kind: str) -> list[Push]:
     return pushes
 
 
-def _check_pushes(system: System, length: float) -> None:
+def _check_pushes(system: Design, length: float) -> None:
     """Refuse pushes of the project that would not act."""
     for push in system.simulation.pushes:
         if push.start_s >= length:
@@ -227,7 +227,7 @@ def _check_pushes(system: System, length: float) -> None:
             )
 
 
-def _clock(system: System) -> Clock:
+def _clock(system: Design) -> Clock:
     """The design's own periods, and physics fine enough for springs and dampers.
 
     Where a step not much finer divides the constant delays too, no step has to be split for them.

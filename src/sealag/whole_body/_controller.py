@@ -52,6 +52,7 @@ class Controller:
             RobotError: the mass matrix at the posture is not positive definite.
         """
         self._motor_damping, self._reference = actuators.motor_damping, reference
+        self._stated = law
         self._law = LawEvaluation(
             robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
         )
@@ -60,7 +61,7 @@ class Controller:
     @property
     def law(self) -> Law:
         """The law that runs."""
-        return self._law.law
+        return self._stated
 
     @property
     def tank_energy(self) -> float:

@@ -9,8 +9,8 @@ from sealag.errors import ContractionError, RobotError
 from sealag.kernels import keep
 from sealag.robot import Contact, Robot
 from sealag.typing import Array, ArrayLike
-from sealag.whole_body._law import Law
 from sealag.whole_body._tank import EnergyTank, TankFlow
+from sealag.whole_body._task_law import TaskLaw
 from sealag.whole_body._task_reader import read_tasks
 from sealag.whole_body._tasks import (
     FORM_CODE,
@@ -55,7 +55,7 @@ class LawEvaluation:
     def __init__(
         self,
         robot: Robot,
-        law: Law,
+        law: TaskLaw,
         spring_stiffness: Array,
         *,
         contacts: tuple[Contact, ...],

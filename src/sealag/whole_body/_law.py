@@ -1,25 +1,15 @@
 """The whole-body control law as one value: what is certified, frozen, simulated and run."""
 
 from dataclasses import dataclass, field
-from itertools import groupby
 
-from sealag.errors import InputError, word
-from sealag.robot import Robot
-from sealag.typing import Array
+from sealag.errors import InputError
 from sealag.whole_body._signals import MotorAngles, Signal
-from sealag.whole_body._stack import TermRows
-from sealag.whole_body._tasks import (
-    GravityCompensation,
-    StiffnessForm,
-    Task,
-    TaskError,
-    TaskInertia,
-    block_diagonal,
-)
+from sealag.whole_body._task_law import TaskLaw
+from sealag.whole_body._tasks import GravityCompensation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Law:
+class Law(TaskLaw):
     """τ_osc = Σ_k J*_{k|prec}ᵀ S_k x̃_k + ḡ, Eqs. (10)-(17), taken at the fed-back signal.
 
     Attributes:
@@ -35,77 +25,24 @@ class Law:
         ordered: the tasks by priority.
     """
 
-    tasks: tuple[Task, ...]
     signal: Signal = field(default_factory=MotorAngles)
-    gravity: GravityCompensation = GravityCompensation.FEEDBACK
-    stiffness_form: StiffnessForm = StiffnessForm.SYMMETRIC
-    task_inertia: TaskInertia = TaskInertia.LAMBDA_TS
-    task_error: TaskError = TaskError.CONSISTENT
-    velocity_feedforward: bool = True
-    ordered: tuple[Task, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Sort the tasks.
 
         Raises:
-            InputError: there is none, two have one name, or a word is not one of its kind.
+            InputError: there is none, two have one name, a word is not one of its kind, or the
+                signal is none.
         """
-        if isinstance(self.tasks, Task) or not all(isinstance(one, Task) for one in self.tasks):
-            raise InputError("The law's tasks are no tuple of Task; write tasks=(task,) for one.")
-        object.__setattr__(self, "tasks", tuple(self.tasks))
-        if not self.tasks:
-            raise InputError("The law has no tasks; at least one is needed.")
-        names = [task.name for task in self.tasks]
-        if len(set(names)) < len(names):
-            raise InputError("Two tasks of the law have the same name.")
-        for name, kind in (
-            ("gravity", GravityCompensation),
-            ("stiffness_form", StiffnessForm),
-            ("task_inertia", TaskInertia),
-            ("task_error", TaskError),
-        ):
-            found = word(kind, getattr(self, name), what=f"The law's {name}")
-            object.__setattr__(self, name, found)
+        TaskLaw.__post_init__(self)
         if not isinstance(self.signal, Signal):
             raise InputError(
                 f"The law's signal is {self.signal!r}; MotorAngles(), LinkAngles(), StaticJoint() "
                 "or Tank() is right."
             )
-        ordered = tuple(sorted(self.tasks, key=lambda task: task.priority))
-        object.__setattr__(self, "ordered", ordered)
 
     @property
     def rests_at_posture(self) -> bool:
         """Whether the loop rests in the posture that it holds wherever contacts balance it: the
         springs carry at q̄(θ) = q what compensates gravity."""
         return self.signal.rests_at_posture and self.gravity is not GravityCompensation.NONE
-
-    def rows(self, robot: Robot) -> list[TermRows]:
-        """Return the Jacobian rows of all tasks, by priority.
-
-        Args:
-            robot: the robot.
-
-        Raises:
-            UnknownNameError: a frame or joint of a task does not exist.
-        """
-        return [task.rows(robot) for task in self.ordered]
-
-    def levels(self, robot: Robot) -> list[int]:
-        """Return the first row of each priority level, then the number of rows m.
-
-        Args:
-            robot: the robot.
-        """
-        ends = [0]
-        for _, tasks in groupby(self.ordered, key=lambda task: task.priority):
-            ends.append(ends[-1] + sum(len(task.rows(robot).rows) for task in tasks))
-        return ends
-
-    def gain(self, robot: Robot) -> Array:
-        """Return K_x of all tasks, (m, m), blocks by priority on the diagonal.
-
-        Args:
-            robot: the robot.
-        """
-        return block_diagonal([t.gain(len(t.rows(robot).rows)) for t in self.ordered])

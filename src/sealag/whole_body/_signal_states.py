@@ -1,17 +1,15 @@
 """Running signals: the fed-back angles from tick to tick, and the law's derivative at rest."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from sealag.typing import Array
+from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._protocol import Measurement
 from sealag.whole_body._tank import EnergyTank
 from sealag.whole_body._tasks import GravityCompensation
-
-if TYPE_CHECKING:
-    from sealag.whole_body._evaluation import LawEvaluation
 
 STEP = 2e-5
 """rad, m: half the base of central differences of the command, extrapolated with those of half the
@@ -150,7 +148,7 @@ class MeasuredAngles:
 
     tank_energy = 0.0
 
-    def __init__(self, law: "LawEvaluation", *, links: bool) -> None:
+    def __init__(self, law: LawEvaluation, *, links: bool) -> None:
         self._law, self._links = law, links
         self._at = np.zeros(law.robot.n)
 
@@ -189,7 +187,7 @@ class MeasuredAngles:
 
 
 def _differences(
-    law: "LawEvaluation", function, q: Array, theta: Array, width: float, *, rows: int = 0
+    law: LawEvaluation, function, q: Array, theta: Array, width: float, *, rows: int = 0
 ):
     """∂f/∂q (k, nv) and ∂f/∂θ (k, n) of function(q, θ, out), by central differences extrapolated to
     none: (4 D(h/2) − D(h)) / 3."""
@@ -214,9 +212,7 @@ class StaticState:
 
     tank_energy = 0.0
 
-    def __init__(
-        self, law: "LawEvaluation", iterations: int, tank: EnergyTank | None = None
-    ) -> None:
+    def __init__(self, law: LawEvaluation, iterations: int, tank: EnergyTank | None = None) -> None:
         self._law, self.followed = law, law.followed(np.zeros(law.robot.n))
         self._running = law.running(static=self.followed, iterations=iterations, tank=tank)
 
@@ -262,7 +258,7 @@ class StaticState:
 class TankState:
     """x̂ of the energy tank; u pulls it to x(q̄(θ))."""
 
-    def __init__(self, law: "LawEvaluation", tank: EnergyTank, iterations: int) -> None:
+    def __init__(self, law: LawEvaluation, tank: EnergyTank, iterations: int) -> None:
         self._law, self._tank, self._static = law, tank, StaticState(law, iterations, tank)
         self._last, self._unused = 0.0, np.zeros(law.robot.n)
 

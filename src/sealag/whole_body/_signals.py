@@ -2,12 +2,13 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from sealag.errors import InputError, UnknownNameError, either, word
 from sealag.typing import Array, BoolArray
+from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._signal_states import (
     MeasuredAngles,
     SignalState,
@@ -15,9 +16,6 @@ from sealag.whole_body._signal_states import (
     TankState,
 )
 from sealag.whole_body._tank import EnergyTank, TankFlow
-
-if TYPE_CHECKING:
-    from sealag.whole_body._evaluation import LawEvaluation
 
 _AS_STIFF_AS_SPRINGS = 1e-12
 """|det(I − K⁻¹ F_q)| below which a law counts as stiff as its springs, F_θ without bound. Ten times
@@ -91,7 +89,7 @@ class Signal(ABC):
         return None
 
     @abstractmethod
-    def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
+    def start(self, law: LawEvaluation, *, delay_bound: float) -> SignalState:
         """Return the running signal.
 
         Args:
@@ -106,7 +104,7 @@ class MotorAngles(Signal):
 
     name: ClassVar[str] = "motor"
 
-    def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
+    def start(self, law: LawEvaluation, *, delay_bound: float) -> SignalState:
         return MeasuredAngles(law, links=False)
 
 
@@ -125,7 +123,7 @@ class LinkAngles(Signal):
             "bound covers it; rely on the local margin",
         )
 
-    def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
+    def start(self, law: LawEvaluation, *, delay_bound: float) -> SignalState:
         return MeasuredAngles(law, links=True)
 
 
@@ -175,7 +173,7 @@ class StaticJoint(Signal):
             f"{contraction.max():.2f}): the task is stiffer than the springs",
         )
 
-    def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
+    def start(self, law: LawEvaluation, *, delay_bound: float) -> SignalState:
         return StaticState(law, self.iterations)
 
 
@@ -221,7 +219,7 @@ class Tank(Signal):
             )
         return StaticJoint(iterations=self.iterations).refusal(contraction)
 
-    def start(self, law: "LawEvaluation", *, delay_bound: float) -> SignalState:
+    def start(self, law: LawEvaluation, *, delay_bound: float) -> SignalState:
         tank = EnergyTank(
             rows=law.rows,
             energy=self.energy,

@@ -7,7 +7,7 @@ import numpy as np
 from sealag.errors import InputError
 from sealag.robot import Contact, Robot
 from sealag.typing import ArrayLike
-from sealag.whole_body._law import Law
+from sealag.whole_body._task_law import TaskLaw
 from sealag.whole_body._tasks import TaskKind
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def read_tasks(
-    robot: Robot, law: Law, contacts: tuple[Contact, ...], *, posture: ArrayLike
+    robot: Robot, law: TaskLaw, contacts: tuple[Contact, ...], *, posture: ArrayLike
 ) -> tuple[list[str], "Tasks"]:
     """Return the tasks' references: their positions in a posture, where all errors are 0.
 
