@@ -9,7 +9,6 @@ import sealag
 from helpers.certificates import half_a_step
 from helpers.designs import EXAMPLES
 from sealag.actuation import Actuators
-from sealag.design import local_margins
 from sealag.robot import Motion
 from sealag.whole_body import LinkAngles, MotorAngles
 
@@ -21,7 +20,7 @@ def passive(system, motion=None):
 @pytest.mark.parametrize("name", ["anymal", "anymal_crawl", "baxter", "talos", "hume_held"])
 def test_one_posture_lies_between_its_two_other_numbers(name):
     system = sealag.load(EXAMPLES / f"{name}.toml")
-    found = local_margins(system)
+    found = system.local_margins()
     assert passive(system) <= found.jitter_s * (1.0 + 1e-8)
     assert found.jitter_s <= found.delay_s
 
@@ -43,8 +42,8 @@ def reaching(system, count):
 def test_a_motion_has_the_smallest_of_its_instants():
     system = sealag.load(EXAMPLES / "baxter.toml")
     motion = reaching(system, 3)
-    whole = local_margins(system, motion)
-    alone = [local_margins(system, motion.at(slice(k, k + 1))).jitter_s for k in range(3)]
+    whole = system.local_margins(motion)
+    alone = [system.local_margins(motion.at(slice(k, k + 1))).jitter_s for k in range(3)]
     assert whole.jitter_s == pytest.approx(min(alone), rel=1e-6)
     assert max(alone) > 1.01 * min(alone)
 
@@ -57,7 +56,7 @@ def test_a_long_motion_has_at_least_its_passive_bound():
         time=1e-3 * np.arange(count), q=1e-4 * np.arange(count)[:, None], v=np.zeros((count, 1)),
         contact_sets=((),), contact_index=np.zeros(count, dtype=int),
     )  # fmt: skip
-    found = local_margins(one, motion)
+    found = one.local_margins(motion)
     smallest = passive(one, motion)
     assert smallest <= found.jitter_s <= found.delay_s
     whole = jitter_margin_of(one, motion, range(0, count, 10))
@@ -66,12 +65,12 @@ def test_a_long_motion_has_at_least_its_passive_bound():
 
 
 def jitter_margin_of(system, motion, instants):
-    return min(local_margins(system, motion.at(slice(k, k + 1))).jitter_s for k in instants)
+    return min(system.local_margins(motion.at(slice(k, k + 1))).jitter_s for k in instants)
 
 
 def test_what_falls_without_delay_has_none():
     system = sealag.load("bundled:hume")
-    found = local_margins(system, half_a_step(system))
+    found = system.local_margins(half_a_step(system))
     assert found.unstable_modes > 0
     assert found.jitter_s == 0.0
 
@@ -81,20 +80,20 @@ def test_link_angles_have_no_passive_bound_and_a_jitter_margin():
     system = sealag.load(EXAMPLES / "baxter.toml")
     system = replace(system, law=replace(system.law, signal=LinkAngles()))
     assert passive(system) == 0.0
-    found = local_margins(system)
+    found = system.local_margins()
     if not found.unstable_modes:
         assert 0.0 < found.jitter_s < found.delay_s
 
 
 def test_a_drive_with_a_bandwidth_has_one_too():
     system = sealag.load(EXAMPLES / "anymal.toml")
-    ideal = local_margins(system).jitter_s
+    ideal = system.local_margins().jitter_s
     drives: Actuators = replace(
         system.actuators, torque_bandwidth=np.full(system.robot.n, 2.0 * np.pi * 60.0)
     )
     slow = replace(system, actuators=drives)
     assert passive(slow) == 0.0
-    found = local_margins(slow)
+    found = slow.local_margins()
     assert 0.0 < found.jitter_s < ideal
     assert found.jitter_s < found.delay_s
 
@@ -109,12 +108,12 @@ def test_a_law_that_sags_has_the_smaller_of_posture_and_rest():
     ]
     alone = [loop.jitter_margin().delay for loop in loops]
     assert max(alone) > 1.0001 * min(alone)
-    assert local_margins(system).jitter_s == pytest.approx(min(alone), rel=1e-7)
+    assert system.local_margins().jitter_s == pytest.approx(min(alone), rel=1e-7)
 
 
 def test_late_torque_feedback_costs():
     system = sealag.load(EXAMPLES / "anymal.toml")
     late = replace(system, delays=replace(system.delays, delayed_torque_feedback=True))
-    found, ideal = local_margins(late), local_margins(system)
+    found, ideal = late.local_margins(), system.local_margins()
     assert 0.0 < found.jitter_s < 0.999 * ideal.jitter_s
     assert found.jitter_s < found.delay_s

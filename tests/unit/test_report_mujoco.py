@@ -12,11 +12,11 @@ import sealag
 from helpers.designs import EXAMPLES
 from helpers.mimics import MIMICS, joint, link, robot
 from helpers.small_systems import arm_system, constant_delays
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Delays, Link, RoundTrip, Sinusoid, Table
 from sealag.errors import InputError
 from sealag.report import MujocoModel
-from sealag.simulation import Clock, Exchanges, Network
+from sealag.simulation import Clock, Network
 
 
 def _refused(system, *words, step=None):
@@ -122,7 +122,7 @@ def test_an_embedded_period_rounds_each_hop_up_as_the_simulator_does(tmp_path):
     steps = MujocoModel.of(arm_system(tmp_path, delays=delays)).steps
     assert (steps.measurement_delay, steps.command_delay) == (0.0015, 0.002)
     clock = Clock(physics=1e-4, embedded=0.0005, central=0.002)
-    plan = Exchanges.plan(Network.from_delays(delays), clock, duration=0.1, seed=1)
+    plan = Network.from_delays(delays).plan(clock, duration=0.1, seed=1)
     ages = plan.ages(0.1)
     assert ages.measurement == pytest.approx(steps.measurement_delay)
     assert ages.command == pytest.approx(steps.command_delay + steps.hold)
@@ -196,7 +196,7 @@ def test_what_is_left_out_is_said(tmp_path):
     said = " ".join(MujocoModel.of(sealag.load(EXAMPLES / "anymal.toml")).left_out)
     assert all(word in said for word in ("torque limits", "speed limits", "ground and friction"))
     system = arm_system(tmp_path)
-    free = actuators(
+    free = Actuators.of(
         system.robot.joints, spring_stiffness=300.0, rotor_inertia=0.1, motor_damping=9.0
     )
     assert MujocoModel.of(replace(system, actuators=free)).left_out == ()

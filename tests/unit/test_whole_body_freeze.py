@@ -9,7 +9,7 @@ import sealag
 from helpers.chains import planar_arm, wheel
 from helpers.controllers import JointPD
 from helpers.designs import EXAMPLES
-from sealag.actuation import actuators
+from sealag.actuation import Actuators
 from sealag.delay import Constant, Link
 from sealag.errors import InputError
 from sealag.simulation import Clock, Network, closed_loop
@@ -58,7 +58,7 @@ def test_the_whole_body_law_is_found_from_outside(name, signal):
 
 
 def stiff(joints, *, inertia, damping):
-    return actuators(
+    return Actuators.of(
         joints, spring_stiffness=1e5, rotor_inertia=inertia, inertia_shaping=1.0,
         motor_damping=damping,
     )  # fmt: skip
@@ -89,7 +89,7 @@ class Feeling(JointPD):
 def arm(tmp_path):
     """Two joints in a horizontal plane."""
     robot = planar_arm(tmp_path, count=2, mass=1.0, inertia=0.05, length=0.3)
-    motors = actuators(
+    motors = Actuators.of(
         robot.joints, spring_stiffness=np.array([300.0, 200.0]),
         rotor_inertia=np.array([0.1, 0.07]), inertia_shaping=0.5,
         motor_damping=np.array([8.0, 5.0]),

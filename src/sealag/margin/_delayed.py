@@ -6,7 +6,7 @@ import numpy as np
 
 from sealag.errors import InputError
 from sealag.margin._jitter import Broken, JitterMargin, jitter_margin
-from sealag.margin._loop import Loop, prepare, real_numbers, time_of
+from sealag.margin._loop import Loop, prepare, real_numbers, real_square, time_of
 from sealag.margin._margin import DelayMargin, exact_margin
 from sealag.margin._roots import loop_roots
 from sealag.margin._sampled import Held, SampledMargin
@@ -189,7 +189,7 @@ class DelayedLoop:
             return (real_numbers("A_1", self.B, what=wanted),)
         B, C = (real_numbers(name, given, what=wanted)
                 for name, given in (("B", self.B), ("C", self.C)))  # fmt: skip
-        size, m = len(real_numbers("A_0", self.A_0, what=wanted)), len(C)
+        size, m = len(real_square("A_0", self.A_0)), len(C)
         if B.shape != (size, m) or C.shape != (m, size):
             raise InputError(
                 f"B is {B.shape} and C {C.shape}; A_0 of {size} states needs ({size}, m) and "
