@@ -50,8 +50,8 @@ def read(path: str) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError) as error:
         raise WrongInputError(getattr(error, "strerror", None) or str(error)) from error
     odd = set(data if isinstance(data, dict) else {}) ^ set(KEYS.split())
-    if odd or data["schema"] != "sealag-certificate/4":
-        raise WrongInputError(f"it is not sealag-certificate/4, or has odd keys {sorted(odd)[:5]}")
+    if odd or data["schema"] != "sealag-certificate/5":
+        raise WrongInputError(f"it is not sealag-certificate/5, or has odd keys {sorted(odd)[:5]}")
     return data
 def _figure(text: str) -> int | float:
     if not math.isfinite(value := float(text)):
@@ -343,17 +343,17 @@ def motion_claims(c: dict[str, Any], D: list[Fraction]) -> Iterator[Claim]:
     yield "conservatism", c["conservatism"] == ratio, f"{ratio}"
     yield _verdict(c, largest)
 def _verdict(c: dict[str, Any], largest: Any) -> Claim:
-    """Certified if and only if every bound covers the delay and no margin undercuts the bound."""
-    d, no = number(c["delay_s"]), bool(c["reasons"])
+    """Passive if every bound covers the delay and no margin undercuts; certified if stable too."""
+    d = number(c["delay_s"])
     shared = [time(c[key]) for key in c["left_open"] if key != "max_delay_s"]
     each = zip(c["instant_margins_s"], c["instant_basis"], c["bounds_s"])
-    undercut = c["criterion"] == "certified" and any(
-        basis == "exact" and 0 < time(m) < time(bound) for m, basis, bound in each)
-    rests = c["equilibrium"] is None or c["equilibrium"]["found"] is True
-    yes = d <= min([largest, *shared]) and not undercut and rests
-    good = c["status"] == ("not_certified" if no else "certified") and (yes or no) and (
-        yes != no or largest == 0)
-    return "status follows", good and d >= 0, f"{c['status']} at {c['delay_s']} s"
+    exact = [(time(m), time(bound)) for m, basis, bound in each if basis == "exact"]
+    lost = any(0 < m <= d or (0 < m < b and c["criterion"] == "certified") for m, b in exact)
+    passive = d <= min([largest, *shared]) and largest > 0 and not lost
+    firm = c["stable"] is True and (c["equilibrium"] or {"found": True})["found"] is True
+    status = ("certified" if firm else "passive_only") if passive else "not_certified"
+    good = d >= 0 and c["status"] == status and bool(c["reasons"]) == (status != "certified")
+    return "status follows", good, f"{c['status']} at {c['delay_s']} s"
 
 def claims(c: dict[str, Any]) -> Iterator[Claim]:
     """Decide every claim of a certificate `c`, as `read` returns it."""

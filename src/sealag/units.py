@@ -12,6 +12,10 @@ that pass; ten times smaller refuses satellite links."""
 _UNITS = ((1e9, "ns"), (1e6, "us"), (1e3, "ms"))
 """Factor from s and name of the units below it."""
 
+_LONG_S = 10.0
+_LONG_UNITS = ((365.25 * 86400.0, "years"), (86400.0, "days"), (3600.0, "h"), (1.0, "s"))
+"""From so many seconds on, units and names by decreasing size; each is used from three of it on."""
+
 
 def seconds_from_ms(value_ms: float) -> float:
     """Convert milliseconds to seconds.
@@ -25,8 +29,27 @@ def seconds_from_ms(value_ms: float) -> float:
     return value_ms * 1e-3
 
 
+def bound_text(value_s: float) -> str:
+    """Say how long a delay may be, in three digits that are rounded down: never more than is known.
+
+    Args:
+        value_s: s, not negative; inf for a time that no delay reaches.
+    """
+    if value_s > LONGEST_DELAY_S:
+        return f"more than {LONGEST_DELAY_S:g} s"
+    value_ms = value_s * 1e3
+    if value_ms <= 0.0:
+        return "0 ms"
+    step = 10.0 ** (math.floor(math.log10(value_ms)) - 2)
+    down = math.floor(value_ms / step) * step
+    return f"{down:.6g} ms" if down < 1e3 else f"{down * 1e-3:.6g} s"
+
+
 def time_text(value_s: float | None) -> str:
     """Format a time in ns, us, ms or s with its significant digits.
+
+    From ten seconds on it is a bound that no network reaches, in the unit that people use for it,
+    rounded down.
 
     Args:
         value_s: s; inf for a time that no delay reaches, None for one that is not known.
@@ -37,13 +60,16 @@ def time_text(value_s: float | None) -> str:
         return "unbounded"
     if value_s == 0.0:
         return "0 ms"
+    if value_s >= _LONG_S:
+        size, unit = next(pair for pair in _LONG_UNITS if value_s >= 3.0 * pair[0])
+        return f"{math.floor(value_s / size):.4g} {unit}"
     factor, unit = 1.0, "s"
     for smaller, name in _UNITS:
         if round(abs(value_s) * smaller, 3) < 1000.0:
             factor, unit = smaller, name
             break
     number = value_s * factor
-    digits = f"{number:.3f}" if 0.1 <= abs(number) < 1e7 else f"{number:.4g}"
+    digits = f"{number:.3f}" if abs(number) >= 0.1 else f"{number:.4g}"
     return f"{digits} {unit}"
 
 
@@ -100,6 +126,7 @@ def check_delay_s(value_s: float, name: str) -> float:
 
 __all__ = [
     "LONGEST_DELAY_S",
+    "bound_text",
     "check_delay_s",
     "in_ms",
     "number_of",

@@ -142,7 +142,7 @@ def test_it_runs_as_a_file_and_by_the_command(tmp_path, capsys):
     whole = json.dumps(data)
     for text, words in (
         ("{", "Expecting property name"),
-        ("[]", "it is not sealag-certificate/4"),
+        ("[]", "it is not sealag-certificate/5"),
         ('{"schema": 1, "schema": 2}', "a key stands twice"),
         (json.dumps({**data, "joints": 3}), "an entry is of another type or size"),
         (json.dumps({**data, "delay_s": None}), "'None' is no finite number"),

@@ -29,7 +29,8 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 app = typer.Typer(
     name="sealag",
     help="How much network delay a robot with springs in its joints tolerates.",
-    epilog="Exit status: 0 yes or done, 1 no (not certified, certificate does not hold), 2 wrong "
+    epilog="Exit status: 0 yes or done, 1 no (not certified, passive only, fell, certificate does "
+    "not hold), 2 wrong "
     "input or an answer that cannot be written, 3 the tool failed, 130 interrupted.",
     context_settings={"help_option_names": ["-h", "--help"]},
     add_completion=False,
@@ -125,10 +126,18 @@ def certify(
             help="How many instants are proven in the certificate, smallest bounds first; or all.",
         ),
     ] = "12",
+    allow_unstable: Annotated[
+        bool,
+        typer.Option(
+            "--allow-unstable",
+            help="Status 0 also for a design that is passive only: you stabilise it by other "
+            "means.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
-    """Bound the delay at every instant of a motion; status 1 if the design is not certified."""
-    from sealag.cli._commands import certify_project
+    """Bound the delay at every instant of a motion; status 1 unless passive at it and stable."""
+    from sealag.cli._certify import certify_project
 
     raise typer.Exit(
         certify_project(
@@ -138,6 +147,7 @@ def certify(
             time_varying=time_varying,
             proofs=proofs,
             out=out,
+            allow_unstable=allow_unstable,
             as_json=as_json,
         )
     )
@@ -245,18 +255,20 @@ def simulate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run the delayed robot, write a recording and print the energy audit."""
+    """Run the delayed robot, write a recording and its energy audit; status 1 if it falls."""
     from sealag.cli._simulate import simulate_project
 
-    simulate_project(
-        project,
-        scenario,
-        duration=duration,
-        seed=seed,
-        delay_scale=delay_scale,
-        log_ms=log_ms,
-        out=out,
-        as_json=as_json,
+    raise typer.Exit(
+        simulate_project(
+            project,
+            scenario,
+            duration=duration,
+            seed=seed,
+            delay_scale=delay_scale,
+            log_ms=log_ms,
+            out=out,
+            as_json=as_json,
+        )
     )
 
 

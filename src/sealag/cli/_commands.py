@@ -12,8 +12,8 @@ from sealag.cli._json import show_json
 from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
-from sealag.files import Draft, check_output, opened, write_text
-from sealag.passivity import Answer, Certificate, Criterion, Status
+from sealag.files import check_output, opened, write_text
+from sealag.passivity import Certificate, Status
 from sealag.robot import Motion
 from sealag.units import seconds_from_ms, time_text
 
@@ -22,12 +22,16 @@ STUDY = "humanoids2016"
 """The package that reproduces the paper: a guest, which the library does not import."""
 LARGEST_LIST = 250
 """Checks that hold and are shown one by one."""
-LONGEST_COUNT = 9
-"""Digits of a number of instants: no motion has more."""
 MANY_INSTANTS = 20_000
 """Instants from which a motion takes so long that a log says so."""
 SLOWEST_INSTANT_S = 0.03
 """Search of one instant of ANYmal for crossings. Where bounds decide, it takes a hundredth."""
+
+_STATED = {
+    Status.CERTIFIED: "",
+    Status.PASSIVE_ONLY: ": as it states, the design is passive only, not shown to be stable",
+    Status.NOT_CERTIFIED: ": as it states, the design is not certified",
+}
 
 
 def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
@@ -59,9 +63,14 @@ def compile_kernels() -> None:
 
 
 @contextmanager
-def _busy(what: str, motion: Motion | None = None) -> Iterator[None]:
+def busy(what: str, motion: Motion | None = None) -> Iterator[None]:
     """Show a spinner on standard error if it is a terminal; elsewhere say that a long motion takes
-    long."""
+    long.
+
+    Args:
+        what: what is being done.
+        motion: the motion that it is done for, if there is one.
+    """
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -75,102 +84,17 @@ def _busy(what: str, motion: Motion | None = None) -> Iterator[None]:
         yield
 
 
-def _motion(system: System, path: Path | None) -> Motion | None:
+def motion_of(system: System, path: Path | None) -> Motion | None:
+    """Return the motion that is named, else the project's own, else None.
+
+    Args:
+        system: the design.
+        path: what --motion names.
+    """
     chosen = path or system.motion_file
     if chosen is None:
         return None
     return system.load_motion(chosen)
-
-
-def _count(proofs: str) -> int:
-    """How many instants --proofs asks for."""
-    number = proofs.isascii() and proofs.isdigit() and len(proofs) <= LONGEST_COUNT
-    if not number or int(proofs) < 1:
-        raise InputError(
-            f"--proofs is {proofs!r}; it must be a whole number from 1 up with at most "
-            f"{LONGEST_COUNT} digits, or all."
-        )
-    return int(proofs)
-
-
-def certify_project(
-    project: str,
-    motion: Path | None,
-    *,
-    criterion: str | None,
-    time_varying: bool,
-    proofs: str,
-    out: Path | None,
-    as_json: bool,
-) -> int:
-    """Certify, write the certificate and show the answer; 1 if it is not certified."""
-    if criterion is not None and criterion not in set(Criterion):
-        raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
-    count = None if proofs == "all" else _count(proofs)
-    system = design.load(project)
-    path = out or Path(f"{system.name}.certificate.json")
-    check_output(path, *system.files, *([motion] if motion else []))
-    along = _motion(system, motion)
-    system.criterion_asked(along, criterion, time_varying=time_varying, proofs=count)
-    with Draft(path) as draft:
-        compile_kernels()
-        with _busy("certifying", along):
-            certificate = design.certify(
-                system, along, criterion=criterion, time_varying=time_varying, proofs=count
-            )
-        certificate.write(draft)
-    if as_json:
-        show_json(certificate.summary())
-    else:
-        _show_certificate(certificate, path)
-    return 0 if certificate.answer.status is Status.CERTIFIED else 1
-
-
-def _stability(answer: Answer) -> str:
-    """Stability without delay, in words; a passive loop need not be stable."""
-    if answer.unstable_modes:
-        count = answer.unstable_modes
-        return f"no: {count} unstable root{'s' * (count > 1)} without delay"
-    if answer.stable is None:
-        return "not known"
-    return "yes" if answer.stable else "no"
-
-
-def _show_certificate(certificate: Certificate, path: Path) -> None:
-    question, answer = certificate.question, certificate.answer
-    worst = answer.worst
-    shares = sorted(worst.direction.items(), key=lambda item: -item[1])
-    limiting = ", ".join(f"{name} {share:.0%}" for name, share in shares[:3] if share >= 0.01)
-    verdict = answer.status.value.replace("_", " ")
-    rows = [
-        ("verdict", f"{verdict} ({question.criterion} criterion)"),
-        ("stable", _stability(answer)),
-        ("largest delay", time_text(answer.max_delay_s)),
-        ("delay of the design", time_text(question.delay_s)),
-        (
-            "worst instant",
-            f"{worst.instant} of {question.instants}, at {worst.time_s:.3f} s",
-        ),
-        ("limiting joints", limiting),
-        ("exact local margin", time_text(answer.local_margin_s)),
-        ("first crossing", time_text(answer.first_crossing_s)),
-        ("published criterion says", time_text(answer.published_max_delay_s)),
-        ("certificate", str(path)),
-    ]
-    if answer.common_multiplier_delay_s is not None:
-        rows.insert(3, ("one multiplier for all", time_text(answer.common_multiplier_delay_s)))
-    if answer.time_varying_delay_s is not None:
-        rows.insert(4, ("time-varying matrices", time_text(answer.time_varying_delay_s)))
-    for name, value in rows:
-        show(f"{name:26} {value}")
-    if answer.status is Status.CERTIFIED and answer.stable is not True:
-        show("passive but not stable: without further control the robot falls or drifts")
-    for reason in answer.reasons:
-        show(f"not certified because {reason}")
-    for bound, reason in answer.left_open.items():
-        show(f"open whether {bound} is longer: {reason}")
-    for assumption in answer.assumptions:
-        show(f"assumed: {assumption.text}")
 
 
 def margin_project(
@@ -194,9 +118,9 @@ def margin_project(
         )
     system = design.load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
-    along = _motion(system, motion)
+    along = motion_of(system, motion)
     compile_kernels()
-    with _busy("computing margins", along):
+    with busy("computing margins", along):
         found = system.local_margins(along, horizon=horizon)
     answer: dict[str, Any] = found.summary()
     if as_json:
@@ -220,7 +144,7 @@ def _sweep_rates(project: str, *, as_json: bool) -> None:
     """Show what each sample rate tolerates."""
     system = design.load(project)
     compile_kernels()
-    with _busy("lifting sampled loops"):
+    with busy("lifting sampled loops"):
         rates = system.rate_sweep()
     if as_json:
         show_json({"rates": [rate.summary() for rate in rates]})
@@ -262,7 +186,7 @@ def verify_certificate(
     else:
         Certificate.read(path)
         system = design.load(project)
-        along = _motion(system, motion)
+        along = motion_of(system, motion)
         compile_kernels()
         result = design.verify_design(path, system, along, exact=exact)
     if as_json:
@@ -276,8 +200,7 @@ def verify_certificate(
         for check in result.checks:
             if not check.ok:
                 show(f"BAD  {check.name}: {check.detail}")
-        certified = result.status is Status.CERTIFIED
-        stated = "" if certified else ": as it states, the design is not certified"
+        stated = _STATED[result.status]
         show(f"the certificate holds{stated}" if result.valid else "the certificate does not hold")
     return 0 if result.valid else 1
 

@@ -35,8 +35,12 @@ def simulate_project(
     log_ms: float | None,
     out: Path | None,
     as_json: bool,
-) -> None:
-    """Run a scenario with a progress bar, write the recording and show the audit."""
+) -> int:
+    """Run a scenario with a progress bar, write the recording and show the audit.
+
+    Returns:
+        0 if the whole duration was simulated; 1 if the robot fell or the run ended otherwise.
+    """
     system = design.load(project)
     path = out or Path(f"{system.name}.mcap")
     check_output(path, *system.files)
@@ -78,6 +82,7 @@ def simulate_project(
         _show(run, answer, kind)
     if run.outcome is Outcome.INTERRUPTED:
         raise KeyboardInterrupt
+    return 0 if run.outcome is Outcome.COMPLETED else 1
 
 
 def _record(run: Run, system: System, draft: Draft) -> Path:

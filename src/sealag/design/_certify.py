@@ -16,10 +16,11 @@ from sealag.design._criteria import (
     prove_instants,
     time_varying_bound,
 )
-from sealag.design._local import Local, local_of
+from sealag.design._local import MOST_EXACT, Local, local_of
 from sealag.design._system import PROOF_COUNT, System
 from sealag.passivity import (
     Answer,
+    Basis,
     Bound,
     Certificate,
     Criterion,
@@ -208,12 +209,13 @@ def _question(case: _Case) -> Question:
 
 def _answer(case: _Case) -> Answer:
     system, local, rest, worst = case.system, case.local, case.rest, case.worst
-    reasons = tuple(_reasons(case))
+    failing, unstable = _reasons(case), _unstable(case)
+    status = Status.PASSIVE_ONLY if unstable else Status.CERTIFIED
     power = system.actuators.motor_damping * np.abs(case.worst_motion) ** 2
     shares = (power / power.sum()).tolist()
     return Answer(
-        status=Status.NOT_CERTIFIED if reasons else Status.CERTIFIED,
-        reasons=reasons,
+        status=Status.NOT_CERTIFIED if failing else status,
+        reasons=(*failing, *unstable),
         max_delay_s=case.max_delay,
         max_delay_upper_s=case.max_delay_upper,
         worst=Worst(
@@ -305,10 +307,11 @@ def _left_open(case: _Case) -> dict[str, str]:
 
 
 def _reasons(case: _Case) -> list[str]:
-    """Conditions that fail, delays that are too long, and bounds that decide nothing."""
+    """Why a design is not passive or loses its stability: conditions that fail, delays that are
+    too long, bounds that decide nothing."""
     bound, delay_s, largest = case.bound, case.system.delays.d_1, case.max_delay
     reasons = list(bound.refusals)
-    if not reasons and delay_s > largest:
+    if not reasons and (delay_s > largest or largest == 0.0):
         solver = f"; a longer one is open: {bound.reason}" if bound.reason else ""
         reasons.append(
             f"the design's delay of {time_text(delay_s)} exceeds the bound of "
@@ -320,11 +323,46 @@ def _reasons(case: _Case) -> list[str]:
         for what, found in shared
         if found and found.reason and found.delay < delay_s
     ]
-    if case.rest is not None and not case.rest.found:
-        reasons.append(f"the loop that holds the posture has no equilibrium: {case.rest.reason}")
     if case.kind is Criterion.CERTIFIED and not reasons:
         reasons += _undercut(case)
-    return reasons
+    return reasons or _lost(case)
+
+
+def _lost(case: _Case) -> list[str]:
+    """Where a loop that is stable without delay is not so at the design's."""
+    local, delay_s = case.local, case.system.delays.d_1
+    exact = np.where(local.basis == Basis.EXACT, local.delay, np.inf)
+    exact[exact == 0.0] = np.inf
+    k = int(np.argmin(exact))
+    if exact[k] > delay_s:
+        return []
+    return [
+        f"the loop loses its stability at {time_text(float(exact[k]))} at instant {k}, before the "
+        f"design's delay of {time_text(delay_s)}"
+    ]
+
+
+def _unstable(case: _Case) -> list[str]:
+    """Why no equilibrium is stable without delay, or why that is not known; empty where one is."""
+    local, count = case.local, len(case.motion)
+    if case.rest is not None and not case.rest.found:
+        return [f"the loop that holds the posture has no equilibrium: {case.rest.reason}"]
+    if local.stable:
+        return []
+    if local.stable is None:
+        found = local.count(Basis.OPEN)
+        why = local.problem or f"at most {MOST_EXACT} instants are decided exactly"
+        return [f"stability is left open at {found} of {count} instants: {why}"]
+    found = int(((local.basis != Basis.OPEN) & (local.delay == 0.0)).sum())
+    modes = local.unstable_modes
+    roots = f"{modes} root{'s' * (modes != 1)} on or right of the axis"
+    why = roots if modes else local.problem or "no loop holds it"
+    return [
+        f"no equilibrium is stable without delay at {found} of the {count} instants "
+        f"(instant {local.critical}: {why})"
+        if count > 1
+        else f"the posture is no stable equilibrium without delay: {why}"
+    ]
 
 
 def _undercut(case: _Case) -> list[str]:

@@ -85,7 +85,8 @@ class Local:
         """Delay at which roots cross first at the critical instant, s; None if not known."""
         if self.margin is None or np.isnan(self.margin.first_crossing):
             return None
-        return float(self.margin.first_crossing)
+        first = float(self.margin.first_crossing)
+        return None if np.isinf(first) and not self.margin.guaranteed else first
 
     def stated_loop(self) -> LocalLoop | None:
         """Return the frozen loop of the critical instant as a certificate states it."""
@@ -157,10 +158,16 @@ class _Known:
 
     @property
     def delay(self) -> float | None:
-        """The margin, s; 0 where nothing balances or the law has no loop; None if not decided."""
+        """The margin, s; 0 where nothing balances or the law has no loop; None if not decided.
+
+        An infinite margin that is not guaranteed is none: joints so slow that rounding hides their
+        crossings have a finite one.
+        """
         if not self.rest.found or self.loop is None or self.roots:
             return 0.0
-        return None if self.margin is None else float(self.margin.delay)
+        if self.margin is None or (np.isinf(self.margin.delay) and not self.margin.guaranteed):
+            return None
+        return float(self.margin.delay)
 
     def order(self) -> tuple[float, int]:
         """Sort the smallest margin first, of zeros the most unstable, an undecided one last."""
@@ -224,10 +231,12 @@ class _Decision:
         )
         try:
             margin = loop.margin(at_most=None if np.isinf(least) else least)
+            told = margin.guaranteed or np.isfinite(margin.delay) or np.isfinite(least)
         except SolverError:
+            told = False
+        if not told:
             self._found(k, Basis.OPEN, np.nan)
-            return
-        if margin.delay < least or np.isinf(least):
+        elif margin.delay < least or np.isinf(least):
             self._found(k, Basis.EXACT, float(margin.delay))
             rest = self._system.in_posture(self._motion, k)
             self._best = _Known(margin=margin, loop=loop, at=Place.POSTURE, rest=rest, problem="")
@@ -276,6 +285,10 @@ class _Decision:
                 )
             else:
                 margin = loop.margin()
+                if not margin.unstable_roots and not margin.guaranteed:
+                    problem = problem or (
+                        "rounding does not tell whether its slowest roots ever cross the axis"
+                    )
         except (ContractionError, SolverError) as error:
             problem = problem or str(error)
         return _Known(margin=margin, loop=loop, at=at, rest=state, problem=problem)

@@ -76,7 +76,7 @@ def verify_design(
 def _recomputed(claimed: Certificate, system: System, motion: Motion | None) -> Iterator[_Check]:
     """What follows from robot, project and motion."""
     proofs, kind = claimed.evidence.proofs, claimed.question.criterion
-    fresh = certify(system, motion, criterion=kind, proofs=max(len(proofs), 1))
+    fresh = certify(system, motion, criterion=kind, proofs=max(len(proofs), 1)).confirmed()
     for name, digest in fresh.question.hashes.items():
         same = claimed.question.hashes.get(name) == digest
         words = "the file's SHA-256" if same else f"the certificate is of another {name} file"

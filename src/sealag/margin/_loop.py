@@ -1,5 +1,6 @@
 """The delayed loop in the form the margin works on: neutral directions out, balanced, low rank."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, TypeAlias
@@ -341,7 +342,9 @@ def eigenvalues_with_error(A: Array) -> tuple[Array, Array]:
     To first order an eigenvalue moves by yᴴ E x / yᴴ x. What E is in the entries of A is bounded
     entry by entry, so that slow modes beside stiff springs keep their digits; what the eigensolver
     adds, a share of ‖A‖, is taken out by the residual up to its square over the distance to the
-    next eigenvalue. Where that distance is too small, the bounds of the whole norm are left.
+    next eigenvalue. Where that distance is too small, the bounds of the whole norm are left: with
+    the left vectors that belong to the right ones, as equal joints have equal eigenvalues, whose
+    own left vectors may be of another of them.
 
     Args:
         A: (n, n).
@@ -353,6 +356,10 @@ def eigenvalues_with_error(A: Array) -> tuple[Array, Array]:
     products = np.sum(left.conj() * right, axis=0)
     overlap = np.maximum(np.abs(products), EPS)
     simple = 4.0 * n * EPS * norm / overlap
+    with suppress(np.linalg.LinAlgError):  # a defective matrix has no such vectors
+        simple = np.minimum(
+            simple, 4.0 * n * EPS * norm * np.linalg.norm(np.linalg.inv(right), axis=1)
+        )
     wide = right.astype(np.clongdouble)
     residual = A.astype(np.clongdouble) @ wide - wide * values
     moved = (np.sum(left.conj() * residual, axis=0) / products).astype(complex)

@@ -167,24 +167,68 @@ def unstable_roots(loop: DelayedLoop, delay: float, *, omega: float | None) -> i
     """
     roots = np.linalg.eigvals(balanced(loop.sum)[0])
     grid = _grid(roots, omega)
-    values = _ratio(loop, grid, delay)
+    far = np.abs(_ratio(loop, grid, delay) - 1.0)
+    turn, moved = _steps(loop, grid[:-1], grid[1:], delay)
     slowest = max(delay, loop.embedded if loop.A_e is not None else 0.0)
     while len(grid) < _MOST_FREQUENCIES:
-        step = values[1:] / values[:-1]
-        turn = np.maximum(np.abs(np.angle(step)), np.abs(np.log(np.abs(step))))
-        far = np.abs(values - 1.0)
-        late = (np.diff(grid) * slowest > _TURN) & (np.maximum(far[1:], far[:-1]) > 0.1)
-        split = np.flatnonzero(~(turn <= _TURN) | late)
-        split = split[np.diff(grid)[split] > 1e-13 * grid[split]]
+        gaps = np.diff(grid)
+        late = (gaps * slowest > _TURN) & (np.maximum(far[1:], far[:-1]) > 0.1)
+        split = np.flatnonzero(~(moved <= _TURN) | late)
+        split = split[gaps[split] > 1e-13 * grid[split]]
         if not len(split):
-            turns = -float(np.angle(step).sum()) / math.pi
-            settled = abs(values[-1] - 1.0) < 0.1 and abs(turns - round(turns)) < 0.1
+            without = np.angle((1j * grid[-1] - roots) / (1j * grid[0] - roots)).sum()
+            turns = float(without - turn.sum()) / math.pi
+            settled = far[-1] < 0.1 and abs(turns - round(turns)) < 0.1
             return int((roots.real > 0.0).sum()) + round(turns) if settled else None
         fresh = (grid[split] + grid[split + 1]) / 2.0
-        order = np.argsort(np.concatenate([grid, fresh]), kind="stable")
-        grid = np.concatenate([grid, fresh])[order]
-        values = np.concatenate([values, _ratio(loop, fresh, delay)])[order]
+        turn[split], moved[split], later = *_steps(loop, grid[split], fresh, delay), split + 1
+        after = _steps(loop, fresh, grid[later], delay)
+        turn, moved = (np.insert(old, later, new) for old, new in zip((turn, moved), after))
+        far = np.insert(far, later, np.abs(_ratio(loop, fresh, delay) - 1.0))
+        grid = np.insert(grid, later, fresh)
     return None
+
+
+def _steps(loop: DelayedLoop, low: Array, high: Array, delay: float) -> tuple[Array, Array]:
+    """How far det P, P = jω − A(jω), turns from one frequency to another, and how far P moves.
+
+    P₂ = P₁ (I + E). The determinant turns by the sum of the angles of the eigenvalues of I + E. It
+    tells that sum but for turns by 2π, which k equal joints make where each turns by 2π/k; the
+    traces of E, E², E³ and E⁴ tell which, if no eigenvalue of E is larger than ½: ‖E¹⁶‖ bounds
+    them.
+
+    Returns:
+        (N,) rad, and (N,) a bound of the eigenvalues of E; NaN where P₁ is singular.
+    """
+    turn, moved = np.full((2, len(low)), np.nan)
+    identity = np.eye(len(loop.A_0))
+    for first in range(0, len(low), _CHUNK):
+        rows = slice(first, first + _CHUNK)
+        start, end = (
+            1j * w[:, None, None] * identity - loop.at(w, delay) for w in (low[rows], high[rows])
+        )
+        with np.errstate(all="ignore"):
+            E = _solved(start, end - start)
+            powers = [E, E @ E]
+            powers += [powers[1] @ E, powers[1] @ powers[1]]
+            shifted = np.einsum("kii->k", powers[0]) - np.einsum("kii->k", powers[1]) / 2.0
+            shifted += np.einsum("kii->k", powers[2]) / 3.0
+            shifted -= np.einsum("kii->k", powers[3]) / 4.0
+            angle = np.angle(np.linalg.slogdet(identity + E)[0])
+            turn[rows] = angle + 2.0 * math.pi * np.round((shifted.imag - angle) / 2.0 / math.pi)
+            last = powers[3] @ powers[3]
+            moved[rows] = np.linalg.norm(last @ last, axis=(1, 2)) ** (1.0 / 16.0)
+    return turn, moved
+
+
+def _solved(P: Array, Q: Array) -> Array:
+    """P⁻¹ Q of (N, n, n) each; NaN where P is singular."""
+    try:
+        return np.linalg.solve(P, Q)
+    except np.linalg.LinAlgError:
+        singular = np.linalg.slogdet(P)[0] == 0.0
+        P = np.where(singular[:, None, None], np.eye(P.shape[-1]), P)
+        return np.where(singular[:, None, None], np.nan, np.linalg.solve(P, Q))
 
 
 def _grid(roots: Array, omega: float | None) -> Array:

@@ -2,17 +2,19 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn, Self
 
 import numpy as np
 
-from sealag.errors import FileError
+from sealag.errors import FileError, SolverError
 from sealag.files import Draft, written_whole
 from sealag.passivity._checks import Check, Verification
 from sealag.passivity._claims import claim_checks
 from sealag.passivity._definite import Reader, doubles, rationals
+from sealag.passivity._headline import headline
+from sealag.passivity._kinds import Basis, Status
 from sealag.passivity._layout import LARGEST_BYTES, encoded
 from sealag.passivity._reading import SCHEMA, content_check, content_digest, plain_of, typed
 from sealag.passivity._shared import common_checks, window_checks
@@ -33,6 +35,9 @@ _LONG = {
 }
 """The evidence, which a summary leaves out."""
 
+_NO_DIGEST = "0" * 64
+"""Stands for the digest of a certificate that is not written yet."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate(Stated):
@@ -50,6 +55,11 @@ class Certificate(Stated):
     def __bool__(self) -> NoReturn:
         """Refuse to be a truth value: a certificate that says no is still a certificate."""
         raise TypeError("A certificate has no truth value; read its `answer.status`.")
+
+    @property
+    def headline(self) -> str:
+        """One sentence: the tolerated delay, the design's own, what limits, and stability."""
+        return headline(self.question, self.answer)
 
     @classmethod
     def read(cls, source: Path | str | Mapping[str, Any]) -> Self:
@@ -153,6 +163,69 @@ class Certificate(Stated):
             self.answer,
             margin_s=self.evidence.instant_margins_s[critical],
             proof=self.evidence.proof_of(critical),
+        )
+
+    def confirmed(self) -> Self:
+        """Return what the verifier confirms of this certificate, before anybody else asks it.
+
+        Where only the frozen loop's checks fail, as at roots that rounding leaves on the axis, the
+        claims of stability and local margin are withdrawn: the design is at most passive only, and
+        `reasons` says what could not be confirmed.
+
+        Returns:
+            This certificate if all its checks hold; else the one with the lower claim.
+
+        Raises:
+            SolverError: something else could not be confirmed, so that nothing can be claimed.
+        """
+        found = self._refused()
+        if not found:
+            return self
+        lower = self._without_loop(f"{found[0].name}: {found[0].detail}")
+        rest = lower._refused()
+        if rest:
+            raise SolverError(
+                f"The certificate's own check does not confirm {rest[0].name} ({rest[0].detail}), "
+                "so that nothing is claimed; please report it with the project and its URDF."
+            )
+        return lower
+
+    def _refused(self) -> list[Check]:
+        """Checks that fail in doubles; what they leave in doubt is decided in rationals."""
+        question = self.question
+        sealed = replace(
+            self,
+            question=replace(question, hashes={**question.hashes, "content": _NO_DIGEST}),
+        )
+        found = [check for check in sealed.checks() if not check.ok]
+        return [check for check in sealed.checks(exact=True) if not check.ok] if found else []
+
+    def _without_loop(self, why: str) -> Self:
+        """The same without any claim of stability and local margin."""
+        answer, evidence, count = self.answer, self.evidence, self.question.instants
+        reason = (
+            "stability and local margin are left open: this certificate's own check does not "
+            f"confirm them ({why})"
+        )
+        certified = answer.status is Status.CERTIFIED
+        return replace(
+            self,
+            answer=replace(
+                answer,
+                status=Status.PASSIVE_ONLY if certified else answer.status,
+                reasons=(*answer.reasons, reason),
+                stable=None,
+                unstable_modes=0,
+                local_margin_s=None,
+                first_crossing_s=None,
+                conservatism=None,
+            ),
+            evidence=replace(
+                evidence,
+                instant_margins_s=(None,) * count,
+                instant_basis=(Basis.OPEN,) * count,
+                local_loop=None,
+            ),
         )
 
     def summary(self) -> dict[str, Any]:

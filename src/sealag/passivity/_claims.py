@@ -217,27 +217,35 @@ def _verdict(c: Stated) -> Check:
     """Status, reasons and delays agree; a bound of 0 is where a condition of the criterion fails.
 
     A bound over the whole motion that a solver left open below the design's delay decides nothing,
-    and a law that loses its stability before its bound is not covered by it.
+    and a law that loses its stability before its bound is not covered by it. What is passive is
+    certified only if it is stable, without delay and up to the design's.
     """
     question, answer, evidence = c.question, c.answer, c.evidence
-    largest, delay, yes = answer.max_delay_s, question.delay_s, not answer.reasons
+    largest, delay = answer.max_delay_s, question.delay_s
     asked = _bounds_asked(c)
     shared = [asked.get(name) for name in answer.left_open if name != "max_delay_s"]
     certified = question.criterion is Criterion.CERTIFIED
     covered = not certified or question.feedback != "joint"
-    undercut = certified and any(
-        m is not None and basis is Basis.EXACT and 0.0 < m < bound
+    exact = [
+        (m, bound)
         for m, basis, bound in zip(
             evidence.instant_margins_s, evidence.instant_basis, evidence.bounds_s
         )
-    )
-    rests = answer.equilibrium is None or answer.equilibrium.found
+        if m is not None and basis is Basis.EXACT
+    ]
+    undercut = certified and any(0.0 < m < bound for m, bound in exact)
+    lost = any(0.0 < m <= delay for m, _ in exact)
     enough = delay <= largest and all(bound is None or delay <= bound for bound in shared)
+    rests = answer.equilibrium is None or answer.equilibrium.found
+    if not enough or largest == 0.0 or undercut or lost:
+        status = Status.NOT_CERTIFIED
+    else:
+        status = Status.CERTIFIED if answer.stable is True and rests else Status.PASSIVE_ONLY
     return Check(
         name="verdict",
-        ok=answer.status is (Status.CERTIFIED if yes else Status.NOT_CERTIFIED)
+        ok=answer.status is status
         and delay >= 0.0
-        and (yes == (enough and not undercut and rests) or (largest == 0.0 and not yes))
+        and bool(answer.reasons) == (status is not Status.CERTIFIED)
         and (covered or largest == 0.0),
         detail=f"{answer.status} by the {question.criterion} criterion at {time_text(delay)}",
     )
@@ -254,18 +262,20 @@ def _published(c: Stated) -> Check:
 
 
 def _conservatism(c: Stated) -> Check:
-    """Margin over bound; at least 1 where a design is certified."""
+    """Margin over bound; at least 1 where a design is passive."""
     ratio, margin, largest = (
         c.answer.conservatism,
         c.answer.local_margin_s or 0.0,
         c.answer.max_delay_s,
     )
     expected = margin / largest if 0.0 < margin < math.inf and 0.0 < largest < math.inf else None
-    certified = c.question.criterion is Criterion.CERTIFIED and c.answer.status is Status.CERTIFIED
+    passive = (
+        c.question.criterion is Criterion.CERTIFIED and c.answer.status is not Status.NOT_CERTIFIED
+    )
     words = "not defined" if ratio is None else f"{ratio:.6g}"
     return Check(
         name="conservatism",
-        ok=ratio == expected and not (certified and ratio is not None and ratio < 1.0),
+        ok=ratio == expected and not (passive and ratio is not None and ratio < 1.0),
         detail=f"local margin over bound is {words}",
     )
 

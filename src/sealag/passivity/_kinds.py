@@ -4,9 +4,16 @@ from enum import StrEnum
 
 
 class Status(StrEnum):
-    """The answer to the question that was asked."""
+    """What may be done with the design at its own delay.
+
+    certified: passive by the criterion, and stable without delay and up to its delay, at every
+    instant. passive_only: passive by the criterion, but no equilibrium is stable, or whether one is
+    stays open: it falls or drifts unless it is stabilised by other means. not_certified: neither is
+    shown, or its stability is lost before its delay.
+    """
 
     CERTIFIED = "certified"
+    PASSIVE_ONLY = "passive_only"
     NOT_CERTIFIED = "not_certified"
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -16,7 +17,8 @@ from sealag.passivity._stated import Stated
 
 T = TypeVar("T", bound=Stated)
 
-SCHEMA = "sealag-certificate/4"
+SCHEMA = "sealag-certificate/5"
+_OLD = re.compile(r"sealag-certificate/[0-4]")
 
 MOST_AXES = 8
 """Of a window; each doubles the vertices to check."""
@@ -77,7 +79,14 @@ def typed(data: dict[str, Any], source: Any, kind: type[T]) -> T:
         CertificateError: it is not a certificate of this layout; the message names the key.
     """
     name = "The data" if isinstance(source, Mapping) else source
-    if data.get("schema") != SCHEMA:
+    schema = data.get("schema")
+    if schema != SCHEMA:
+        if isinstance(schema, str) and _OLD.fullmatch(schema):
+            raise CertificateError(
+                f"{name} has the layout {schema}, whose `certified` did not say that the design is "
+                "stable; certify the project again with this sealag, or verify the file with the "
+                "version that it names in `versions`."
+            )
         raise CertificateError(f"{name} is not a certificate of the layout {SCHEMA}.")
     try:
         certificate = decoded(data, kind)

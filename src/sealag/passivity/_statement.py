@@ -113,8 +113,8 @@ class Answer:
     file, means not known, or not asked for where it says so.
 
     Attributes:
-        status: certified or not.
-        reasons: why it is not certified.
+        status: certified, passive only, or not certified.
+        reasons: why it is not certified; of what is passive only, why it is not known to be stable.
         max_delay_s: smallest bound over the motion, s; 0 where a condition of the criterion fails.
         max_delay_upper_s: no longer delay satisfies the criterion at the worst instant, s.
         worst: the instant that sets the bound.
