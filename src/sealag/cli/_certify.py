@@ -1,0 +1,111 @@
+"""`sealag certify`: the certificate, its sentence and its numbers."""
+
+from pathlib import Path
+
+from sealag import design
+from sealag.cli._commands import busy, compile_kernels, motion_of
+from sealag.cli._json import show_json
+from sealag.cli._terminal import show
+from sealag.errors import InputError
+from sealag.files import Draft, check_output
+from sealag.passivity import Answer, Certificate, Criterion, Status
+from sealag.units import time_text
+
+LONGEST_COUNT = 9
+"""Digits of a number of instants: no motion has more."""
+
+
+def _count(proofs: str) -> int:
+    """How many instants --proofs asks for."""
+    number = proofs.isascii() and proofs.isdigit() and len(proofs) <= LONGEST_COUNT
+    if not number or int(proofs) < 1:
+        raise InputError(
+            f"--proofs is {proofs!r}; it must be a whole number from 1 up with at most "
+            f"{LONGEST_COUNT} digits, or all."
+        )
+    return int(proofs)
+
+
+def certify_project(
+    project: str,
+    motion: Path | None,
+    *,
+    criterion: str | None,
+    time_varying: bool,
+    proofs: str,
+    out: Path | None,
+    allow_unstable: bool,
+    as_json: bool,
+) -> int:
+    """Certify, write what the certificate's own check confirms and show the answer.
+
+    Returns:
+        0 if the design is certified, or passive only where that is enough; else 1.
+    """
+    if criterion is not None and criterion not in set(Criterion):
+        raise InputError(f"--criterion is {criterion!r}; it must be certified or published.")
+    count = None if proofs == "all" else _count(proofs)
+    system = design.load(project)
+    path = out or Path(f"{system.name}.certificate.json")
+    check_output(path, *system.files, *([motion] if motion else []))
+    along = motion_of(system, motion)
+    system.criterion_asked(along, criterion, time_varying=time_varying, proofs=count)
+    with Draft(path) as draft:
+        compile_kernels()
+        with busy("certifying", along):
+            certificate = design.certify(
+                system, along, criterion=criterion, time_varying=time_varying, proofs=count
+            ).confirmed()
+        certificate.write(draft)
+    if as_json:
+        show_json(certificate.summary())
+    else:
+        _show_certificate(certificate, path)
+    enough = {Status.CERTIFIED, *([Status.PASSIVE_ONLY] if allow_unstable else [])}
+    return 0 if certificate.answer.status in enough else 1
+
+
+def _stability(answer: Answer) -> str:
+    """Stability without delay, in words; a passive loop need not be stable."""
+    if answer.unstable_modes:
+        count = answer.unstable_modes
+        return f"no: {count} unstable root{'s' * (count > 1)} without delay"
+    if answer.stable is None:
+        return "not known"
+    return "yes" if answer.stable else "no"
+
+
+def _show_certificate(certificate: Certificate, path: Path) -> None:
+    question, answer = certificate.question, certificate.answer
+    worst = answer.worst
+    shares = sorted(worst.direction.items(), key=lambda item: -item[1])
+    limiting = ", ".join(f"{name} {share:.0%}" for name, share in shares[:3] if share >= 0.01)
+    verdict = answer.status.value.replace("_", " ")
+    show(certificate.headline)
+    rows = [
+        ("verdict", f"{verdict} ({question.criterion} criterion)"),
+        ("stable", _stability(answer)),
+        ("largest delay", time_text(answer.max_delay_s)),
+        ("delay of the design", time_text(question.delay_s)),
+        (
+            "worst instant",
+            f"{worst.instant} of {question.instants}, at {worst.time_s:.3f} s",
+        ),
+        ("limiting joints", limiting),
+        ("exact local margin", time_text(answer.local_margin_s)),
+        ("first crossing", time_text(answer.first_crossing_s)),
+        ("published criterion says", time_text(answer.published_max_delay_s)),
+        ("certificate", str(path)),
+    ]
+    if answer.common_multiplier_delay_s is not None:
+        rows.insert(3, ("one multiplier for all", time_text(answer.common_multiplier_delay_s)))
+    if answer.time_varying_delay_s is not None:
+        rows.insert(4, ("time-varying matrices", time_text(answer.time_varying_delay_s)))
+    for name, value in rows:
+        show(f"{name:26} {value}")
+    for reason in answer.reasons:
+        show(f"{verdict} because {reason}")
+    for bound, reason in answer.left_open.items():
+        show(f"open whether {bound} is longer: {reason}")
+    for assumption in answer.assumptions:
+        show(f"assumed: {assumption.text}")
