@@ -12,9 +12,9 @@ that pass; ten times smaller refuses satellite links."""
 _UNITS = ((1e9, "ns"), (1e6, "us"), (1e3, "ms"))
 """Factor from s and name of the units below it."""
 
-_LONG_S = 10.0
+_LONG_S, _LONGEST_S = 10.0, 1000.0 * 365.25 * 86400.0
 _LONG_UNITS = ((365.25 * 86400.0, "years"), (86400.0, "days"), (3600.0, "h"), (1.0, "s"))
-"""From so many seconds on, units and names by decreasing size; each is used from three of it on."""
+"""Between these seconds, units and names by decreasing size; each is used from three of it on."""
 
 
 def seconds_from_ms(value_ms: float) -> float:
@@ -60,9 +60,11 @@ def time_text(value_s: float | None) -> str:
         return "unbounded"
     if value_s == 0.0:
         return "0 ms"
+    if value_s >= _LONGEST_S:
+        return "more than 1000 years"
     if value_s >= _LONG_S:
         size, unit = next(pair for pair in _LONG_UNITS if value_s >= 3.0 * pair[0])
-        return f"{math.floor(value_s / size):.4g} {unit}"
+        return f"{math.floor(value_s / size)} {unit}"
     factor, unit = 1.0, "s"
     for smaller, name in _UNITS:
         if round(abs(value_s) * smaller, 3) < 1000.0:

@@ -140,12 +140,12 @@ def test_a_fall_is_a_named_result(tmp_path, cli):
         "simulate", "bundled:hume", "--scenario", "regulate", "--out", tmp_path / "r.mcap", "--json"
     )
     answer = json.loads(text)
-    assert code == 0
+    assert code == 1
     assert answer["outcome"] == "fell"
     assert "tilted" in answer["message"]
     arguments = ("--scenario", "regulate", "--out", tmp_path / "r.mcap")
     code, text, _ = cli("simulate", "bundled:hume", *arguments)
-    assert code == 0
+    assert code == 1
     assert text.splitlines()[0] == f"{'outcome':26} fell: {answer['message']}"
     assert read_recording(tmp_path / "r.mcap").complete
 

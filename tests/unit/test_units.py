@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sealag.errors import InputError
-from sealag.units import check_delay_s, seconds_from_ms, time_text
+from sealag.units import bound_text, check_delay_s, seconds_from_ms, time_text
 
 
 @pytest.mark.parametrize(
@@ -18,8 +18,13 @@ from sealag.units import check_delay_s, seconds_from_ms, time_text
         (0.0, "0 ms"),
         (1.25, "1.250 s"),
         (1e-15, "1e-06 ns"),
-        (22213.0, "22213.000 s"),
-        (1e12, "1e+12 s"),
+        (9.9996, "10.000 s"),
+        (19.311953647, "19 s"),
+        (729.916, "729 s"),
+        (22213.0, "6 h"),
+        (19_311_953.647, "223 days"),
+        (4e8, "12 years"),
+        (1e12, "more than 1000 years"),
         (math.inf, "unbounded"),
         (None, "not known"),
         (math.nan, "not known"),
@@ -27,6 +32,24 @@ from sealag.units import check_delay_s, seconds_from_ms, time_text
 )
 def test_a_time_has_its_unit_and_digits_that_say_something(seconds, text):
     assert time_text(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.08056, "80.5 ms"),
+        (0.066, "66 ms"),
+        (0.0089659, "8.96 ms"),
+        (1.7139, "1.71 s"),
+        (4.999, "4.99 s"),
+        (4.5e-7, "0.00045 ms"),
+        (19.3, "more than 5 s"),
+        (math.inf, "more than 5 s"),
+        (0.0, "0 ms"),
+    ],
+)
+def test_a_bound_is_rounded_down(seconds, text):
+    assert bound_text(seconds) == text
 
 
 def test_milliseconds_are_thousandths_of_a_second():

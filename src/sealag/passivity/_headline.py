@@ -53,7 +53,7 @@ def _stability(answer: Answer) -> str:
         return f"stable up to {bound_text(answer.local_margin_s or 0.0)}"
     if answer.equilibrium is not None and not answer.equilibrium.found:
         return "nothing holds it in this posture"
-    return "it is not stable without any delay"
+    return "it is unstable even without delay"
 
 
 def _limiting(direction: Mapping[str, float]) -> str:

@@ -32,6 +32,11 @@ from sealag.typing import Array
 
 _STILL = 1e-6
 
+_ROUNDING = 1e-9
+"""Share of the energies in a side's books below which it spends nothing: a slack is a difference of
+them, of a run that begins balanced to 1e-10 of weight and torques. Ten times less accuses robots of
+30 kg that stand still; ten times more hides a millionth of a joule."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Passivity:
@@ -42,8 +47,9 @@ class Passivity:
         passive: True if the slack never fell below ``-tolerance``.
         first_violation: First logged instant at which it did, s; None if never.
         joint: Joint that had delivered most energy at that instant; None if never.
-        tolerance: What rounding and integration may spend, J: twice the largest residual, and the
-            error of the undelayed command's work.
+        tolerance: What rounding and integration may spend, J: twice the largest residual, a
+            billionth of the side's energies (what is stored, and what has moved), and the error of
+            the undelayed command's work.
     """
 
     slack: Array
@@ -232,10 +238,12 @@ def audit(
         slack[rows] = drive.sum(axis=1) + scalar[rows, DISTURBANCE] - (s_j - s_0)
         release(joint, stores, scalar, theta_dot)
     spent = float(np.abs(error).max(initial=0.0))
-    tolerance = 2.0 * spent + 1e-9 * float(throughput[-1]) + 1e-12 if time.size else 0.0
+    moved = float(throughput[-1]) if time.size else 0.0
+    tolerance = 2.0 * spent + _ROUNDING * (moved + _largest(stores))
     control = delay = injection = own = None
     if stated is not None:
         work, potential = stated.work, stated.storage
+        of_law = tolerance + _ROUNDING * _largest(potential[:, None])
         injection, own, of_control, of_delay = (store.zeros(len(time)) for _ in range(4))
         for rows in blocks(len(time)):
             given = work[rows].sum(axis=1)
@@ -245,11 +253,11 @@ def audit(
             of_control[rows] = of_delay[rows] - own[rows]
             release(joint, work)
         control = _observe(
-            time, of_control, lambda row: command[row] - damping[row], joints, tolerance
+            time, of_control, lambda row: command[row] - damping[row], joints, of_law
         )
         delay = _observe(
             time, of_delay, lambda row: command[row] - work[row] - damping[row], joints,
-            tolerance + stated.rough,
+            of_law + stated.rough,
         )  # fmt: skip
     return Audit(
         time=time,
@@ -272,6 +280,12 @@ def audit(
         controller_side=control,
         delay_side=delay,
     )
+
+
+def _largest(energies: Array) -> float:
+    """Largest sum over the run of the magnitudes of energies (N, k), J."""
+    sums = (np.abs(energies[rows]).sum(axis=1).max() for rows in blocks(len(energies)))
+    return max(map(float, sums), default=0.0)
 
 
 def _observe(
