@@ -79,7 +79,10 @@ def without_loop(data: dict[str, Any]) -> dict[str, Any]:
     nothing = ("local_loop", "local_margin_s", "first_crossing_s", "stable", "conservatism")
     count = data["instants"]
     open_ = {"instant_margins_s": [None] * count, "instant_basis": ["open"] * count}
-    return {**data, **dict.fromkeys(nothing), **open_, "unstable_modes": 0}
+    less = {**data, **dict.fromkeys(nothing), **open_, "unstable_modes": 0}
+    if data["status"] == "certified":
+        less |= {"status": "passive_only", "reasons": ["nothing is said of its stability"]}
+    return less
 
 
 def resealed(data: dict[str, Any]) -> dict[str, Any]:

@@ -593,11 +593,16 @@ MUTANTS = [
         ("if not answered and status in (0, 1):", "if False:", "an answer that nobody reads"),
     ),
     *_of(
-        "cli", "cli/_commands.py",
-        ("return 0 if certificate.answer.status is Status.CERTIFIED else 1", "return 0",
-         "status of a no"),
+        "cli", "cli/_certify.py",
+        ("return 0 if certificate.answer.status in enough else 1", "return 0", "status of a no"),
+        ("*([Status.PASSIVE_ONLY] if allow_unstable else [])", "Status.PASSIVE_ONLY",
+         "status of what is passive only"),
+        (").confirmed()", ")", "a certificate that its own check does not confirm"),
         ("key=lambda item: -item[1])\n    limiting", "key=lambda item: item[1])\n    limiting",
          "order of the limiting joints"),
+    ),
+    *_of(
+        "cli", "cli/_commands.py",
         ("return 0 if result.valid else 1", "return 0", "status of a forged certificate"),
     ),
     *_of(

@@ -211,6 +211,8 @@ def _answer(case: _Case) -> Answer:
     system, local, rest, worst = case.system, case.local, case.rest, case.worst
     failing, unstable = _reasons(case), _unstable(case)
     status = Status.PASSIVE_ONLY if unstable else Status.CERTIFIED
+    if failing and (rest is None or rest.found):  # `stable` says it beside a bound that fails
+        unstable = []
     power = system.actuators.motor_damping * np.abs(case.worst_motion) ** 2
     shares = (power / power.sum()).tolist()
     return Answer(

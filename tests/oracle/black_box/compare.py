@@ -175,12 +175,14 @@ def _differences(ours: Both, theirs: Theirs) -> list[str]:
         wrong.append(f"unstable modes {theirs.unstable}, true {ours.unstable}")
     if not same(margin, ours.margin):
         wrong.append(f"margin {margin * 1e3:.6g} ms, true {ours.margin * 1e3:.6g} ms")
-    if theirs.status == "certified":
+    if theirs.status == "certified" and not ours.stable:
+        wrong.append("certified, and unstable without delay")
+    if theirs.status in ("certified", "passive_only"):
         if theirs.stable and bound > ours.margin * (1 + AGREEMENT):
             wrong.append(f"certified to {bound * 1e3:.6g} ms, true {ours.margin * 1e3:.6g} ms")
         over = sorted({joint for one in ours.answers for joint in one.overloaded})
         if over:
-            wrong.append(f"certified, and {', '.join(over)} cannot carry the load")
+            wrong.append(f"{theirs.status}, and {', '.join(over)} cannot carry the load")
     return wrong
 
 

@@ -100,8 +100,11 @@ def judge_motion(ours: list[Both], found) -> list[str]:
                 wrong.append(f"instant {k} exactly {said:.9g} s, true {true:.9g} s")
         elif said > true * (1 + AGREEMENT):
             wrong.append(f"instant {k} at least {said:.9g} s ({basis}), true {true:.9g} s")
-        if answer.status == "certified" and true > 0.0 and bound > true * (1 + AGREEMENT):
-            wrong.append(f"certified to {bound:.9g} s, instant {k} loses it at {true:.9g} s")
+        passive = answer.status in ("certified", "passive_only")
+        if passive and true > 0.0 and bound > true * (1 + AGREEMENT):
+            wrong.append(f"passive to {bound:.9g} s, instant {k} loses it at {true:.9g} s")
+        if answer.status == "certified" and true <= found.question.delay_s:
+            wrong.append(f"certified, instant {k} is not stable at its delay")
     if exact and not same(number(answer.local_margin_s) or 0.0, min(exact)):
         wrong.append(f"margin {answer.local_margin_s}, smallest exact {min(exact):.9g} s")
     if exact and len(exact) == len(margins) and not same(min(exact), min(margins)):
