@@ -67,6 +67,10 @@ FLOATING = {
 }
 TANK = {"controller.feedback": "static_joint_tank", "controller.gravity": "none"}
 PUSH = {"frame": "tip", "force_n": [1.0, 0.0, 0.0], "start_s": 0.1, "duration_s": 0.1}
+JOINT_PD = {
+    "controller": {"kind": "joint_pd", "gravity": "planned", "kp": 60.0, "kd": 1.0},
+    "tasks": None,
+}
 WALK = {"walking": {"feet": ["tip", "side"]}}
 ROUGH, STAIRS = {"kind": "rough"}, {"kind": "stairs", "rises_m": [0.1]}
 PRINTED = {"tasks": [{"name": "x", "kind": "posture", "stiffness": [50.0, 9.0]}]}
@@ -102,8 +106,11 @@ CHANGES: list[tuple[str, dict[str, Any], Any]] = [
     ("controller.tank_flow", TANK, "published"),
     ("controller.tank_energy_j", TANK, 0.0),
     ("controller.tank_rate", TANK, 50.0),
+    *((f"controller.{key}", JOINT_PD, value) for key, value in (
+        ("kp", 80.0), ("kd", 3.0), ("damping_at", "drive"))),
     ("tasks.kind", {}, "com"),
     ("tasks.stiffness", {}, 60.0),
+    ("tasks.damping", {}, 2.0),
     ("tasks.frame", {}, "lower"),
     ("tasks.joints", PRINTED | {"tasks": [{"name": "x", "kind": "posture", "stiffness": 9.0}]},
      ["j1"]),

@@ -102,6 +102,7 @@ class Design:
         for contact in self.contacts:
             self.robot.check_frame(contact.frame)
         self.law.gain(self.robot)
+        self.law.drag(self.robot)
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -24,8 +24,13 @@ class LocalMargins:
             was left open and none is unstable.
         first_crossing_s: smallest delay at which one more pair of roots crosses, s; None if not
             known.
+        passive_s: smallest passive bound over the instants, s: any passive robot and environment,
+            every delay that varies as it likes below it; 0 where no bound covers the design.
+        not_passive: why none does, in words; empty if one does.
         jitter_s: smallest jitter margin over the instants, s: stable for every delay that varies as
             it likes below it; 0 where the loop is unstable without delay, None if not known.
+        channels_s: exact margin at the critical instant if only the position signals, or only the
+            rates, of the command are late, s; empty if it feeds back no rates.
         frequency_rad_s: frequency of that pair, rad/s; None without one.
         mode: share of each joint's motor in that pair's motion.
         unstable_modes: roots with positive real part without delay, at that instant.
@@ -42,7 +47,10 @@ class LocalMargins:
 
     delay_s: float | None
     first_crossing_s: float | None
+    passive_s: float
+    not_passive: str
     jitter_s: float | None
+    channels_s: Mapping[str, float]
     frequency_rad_s: float | None
     mode: Mapping[str, float]
     unstable_modes: int
@@ -59,6 +67,7 @@ class LocalMargins:
         """Return everything as JSON says it: "unbounded" for a time that no delay reaches, None for
         what is not known."""
         plain = {key: stated(value) for key, value in asdict(self).items()}
+        plain["channels_s"] = {name: stated(value) for name, value in self.channels_s.items()}
         plain["intervals"] = [
             {"from_s": shortest, "to_s": stated(longest), "unstable_roots": count}
             for shortest, longest, count in self.intervals
@@ -85,7 +94,8 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
     if horizon is not None and not (math.isfinite(horizon) and horizon > 0.0):
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
     system, motion = along.system, along.motion
-    bounds = bounds_along(along, Criterion.CERTIFIED).bound.delay
+    bound = bounds_along(along, Criterion.CERTIFIED).bound
+    bounds = bound.delay
     local = local_of(along, bounds)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
@@ -100,7 +110,10 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
     return LocalMargins(
         delay_s=local.margin_s,
         first_crossing_s=local.first_crossing_s,
+        passive_s=float(bounds.min()),
+        not_passive="; ".join(bound.refusals),
         jitter_s=jitter_along(along, bounds, local),
+        channels_s=loop.channels() if system.law.damped else {},
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=dict(zip(system.robot.joints, shares.tolist(), strict=True)),
         unstable_modes=margin.unstable_roots,
