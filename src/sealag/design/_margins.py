@@ -12,7 +12,9 @@ from sealag.design._criteria import bounds_along
 from sealag.design._jitter import jitter_along
 from sealag.design._local import local_of
 from sealag.errors import ContractionError, InputError, SolverError
+from sealag.margin import DelayMargin
 from sealag.passivity import Basis, Criterion
+from sealag.whole_body import FrozenLoop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +96,8 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
     if horizon is not None and not (math.isfinite(horizon) and horizon > 0.0):
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
     system, motion = along.system, along.motion
+    if system.program is not None:
+        return _of_program(along, horizon)
     bound = bounds_along(along, Criterion.CERTIFIED).bound
     bounds = bound.delay
     local = local_of(along, bounds)
@@ -104,9 +108,6 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         raise SolverError(local.problem)
     if horizon is not None:
         margin = loop.margin(horizon=horizon)
-    motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
-    size = np.abs(margin.mode[motors]) if len(margin.mode) else np.zeros(len(motors))
-    shares = size / max(float(size.sum()), 1e-300)
     return LocalMargins(
         delay_s=local.margin_s,
         first_crossing_s=local.first_crossing_s,
@@ -115,7 +116,7 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         jitter_s=jitter_along(along, bounds, local),
         channels_s=loop.channels() if system.law.damped else {},
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
-        mode=dict(zip(system.robot.joints, shares.tolist(), strict=True)),
+        mode=_shares(loop, margin, system.robot.joints),
         unstable_modes=margin.unstable_roots,
         neutral=margin.neutral,
         equilibrium="found" if rest is not None and rest.found else local.problem,
@@ -126,3 +127,43 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         bounded=local.count(Basis.BOUND),
         intervals=margin.intervals,
     )
+
+
+def _of_program(along: Along, horizon: float | None) -> LocalMargins:
+    """The margins of a controller that only its ticks are known of, in its posture."""
+    system = along.system
+    if len(along.motion) > 1:
+        raise InputError(
+            f"The controller of {system.name} is a program, which is frozen in the posture that it "
+            "holds: leave the motion out."
+        )
+    loop = system.frozen()
+    margin = loop.margin(horizon=horizon)
+    first = None if math.isnan(margin.first_crossing) else float(margin.first_crossing)
+    return LocalMargins(
+        delay_s=float(margin.delay),
+        first_crossing_s=first,
+        passive_s=0.0,
+        not_passive="the controller is a program, of which only its ticks are known",
+        jitter_s=0.0 if margin.unstable_roots else float(loop.jitter_margin().delay),
+        channels_s=loop.channels(),
+        frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
+        mode=_shares(loop, margin, system.robot.joints),
+        unstable_modes=margin.unstable_roots,
+        neutral=margin.neutral,
+        equilibrium="found",
+        instant=0,
+        time_s=float(along.motion.time[0]),
+        instants=1,
+        exact=1,
+        bounded=0,
+        intervals=margin.intervals,
+    )
+
+
+def _shares(loop: FrozenLoop, margin: DelayMargin, joints: tuple[str, ...]) -> dict[str, float]:
+    """Share of each joint's motor in the motion that crosses first."""
+    motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
+    size = np.abs(margin.mode[motors]) if len(margin.mode) else np.zeros(len(motors))
+    shares = size / max(float(size.sum()), 1e-300)
+    return dict(zip(joints, shares.tolist(), strict=True))

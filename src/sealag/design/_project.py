@@ -22,7 +22,15 @@ from sealag.delay import (
 )
 from sealag.design._design import Source
 from sealag.design._plain_words import first_problem
-from sealag.design._schema import AXES, JointPdKeys, Project, SamplesDelay, WholeBodyKeys
+from sealag.design._program import program_of
+from sealag.design._schema import (
+    AXES,
+    JointPdKeys,
+    ProgramKeys,
+    Project,
+    SamplesDelay,
+    WholeBodyKeys,
+)
 from sealag.design._system import System
 from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError
@@ -142,6 +150,11 @@ def _system(project: Project, path: Path, text: str) -> System:
     if isinstance(project.controller, JointPdKeys) and project.controller.damping_at == "drive":
         kd = _by_joint(project.controller.kd, robot, path, "controller.kd")
         actuators = replace(actuators, motor_damping=actuators.motor_damping + kd)
+    program, program_file = None, None
+    if isinstance(project.controller, ProgramKeys):
+        program_file = folder / project.controller.file
+        with _named(path, "controller.file"):
+            program = program_of(program_file, project.controller.function)
     with _named(path, "simulation.pushes"):
         for push in project.simulation.pushes:
             robot.check_frame(push.frame)
@@ -153,12 +166,13 @@ def _system(project: Project, path: Path, text: str) -> System:
                 f"{path}: motion.file is {project.motion.file!r}; there is no such file."
             )
     samples = [keys.file for _, keys in project.delays if isinstance(keys, SamplesDelay)]
-    files = [path, robot.urdf_path, motion_file, *(folder / name for name in samples)]
+    files = [path, robot.urdf_path, motion_file, program_file, *(folder / name for name in samples)]
     return System(
         name=path.stem,
         robot=robot,
         actuators=actuators,
         law=law,
+        program=program,
         contacts=_contacts(project.contacts, robot, path),
         posture=_posture(project.posture, robot, path),
         criterion=_criterion(project.controller),
@@ -177,12 +191,15 @@ def _system(project: Project, path: Path, text: str) -> System:
 def _law(project: Project, robot: Robot, path: Path) -> Law:
     """The law of [controller], with the [[tasks]] of a whole-body one."""
     keys = project.controller
+    if not isinstance(keys, WholeBodyKeys) and project.tasks:
+        raise ProjectError(
+            f'{path}: [[tasks]] are given, but controller.kind is "{keys.kind}", which has none; '
+            'remove them, or let the kind be "wbosc".'
+        )
+    if isinstance(keys, ProgramKeys):
+        nothing = Task(name="none", kind=TaskKind.POSTURE, stiffness=np.zeros(robot.n))
+        return Law(tasks=(nothing,), gravity=GravityCompensation.NONE)
     if isinstance(keys, JointPdKeys):
-        if project.tasks:
-            raise ProjectError(
-                f'{path}: [[tasks]] are given, but controller.kind is "joint_pd", whose only task '
-                'is its joints; remove them, or let the kind be "wbosc".'
-            )
         late = keys.damping_at == "controller"
         joints = Task(
             name="joints",
@@ -224,7 +241,7 @@ def _by_joint(given: float | dict[str, float], robot: Robot, path: Path, key: st
     return np.array([given[name] for name in robot.joints])
 
 
-def _criterion(keys: WholeBodyKeys | JointPdKeys) -> Criterion:
+def _criterion(keys: WholeBodyKeys | JointPdKeys | ProgramKeys) -> Criterion:
     return Criterion(keys.criterion) if isinstance(keys, WholeBodyKeys) else Criterion.CERTIFIED
 
 

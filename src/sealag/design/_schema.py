@@ -176,13 +176,23 @@ class JointPdKeys(Section):
     damping_at: Literal["controller", "drive"] = "controller"
 
 
+class ProgramKeys(Section):
+    """[controller] of kind "python": a function of the user's own makes what ticks"""
+
+    kind: Literal["python"]
+    file: str
+    function: str = "controller"
+
+
 def _kind_of(value: Any) -> str:
     """The kind of a [controller] table: the paper's law if none is named."""
     return str(value.get("kind", "wbosc")) if isinstance(value, dict) else "wbosc"
 
 
 ControllerKeys = Annotated[
-    Annotated[WholeBodyKeys, Tag("wbosc")] | Annotated[JointPdKeys, Tag("joint_pd")],
+    Annotated[WholeBodyKeys, Tag("wbosc")]
+    | Annotated[JointPdKeys, Tag("joint_pd")]
+    | Annotated[ProgramKeys, Tag("python")],
     Discriminator(_kind_of),
 ]
 

@@ -34,7 +34,8 @@ motor_damping = "FILL: D_theta, Nms/rad (Ns/m where the joint slides), embedded 
 [controller]
 # kind = "wbosc"               # the law of the tasks below; or joint_pd, which has no tasks but
 # kp (Nm/rad) and kd (Nms/rad), a number for all joints or a table with one of each, gravity,
-# feedback (motor or joint) and damping_at ("controller", where kd is late, or "drive").
+# feedback (motor or joint) and damping_at ("controller", where kd is late, or "drive"); or python,
+# with the file of a function (function) that makes what ticks from a System, and nothing else.
 feedback = "motor"             # motor | static_joint | static_joint_tank | joint
 gravity = "planned"            # feedback | planned | none
 stiffness_form = "symmetric"   # symmetric | published | force (without the task inertia)

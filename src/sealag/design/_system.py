@@ -174,6 +174,7 @@ class System(Design):
         Raises:
             InputError: as `certify` raises it.
         """
+        self.require_law("A certificate's bounds are")
         if not isinstance(motion, Motion | None):
             raise InputError(f"motion is {motion!r}; System.load_motion makes a Motion of a file.")
         if motion is not None and len(motion) > MOST_INSTANTS:
