@@ -37,6 +37,8 @@ class System(Design):
         robot: the robot.
         actuators: its series elastic actuators.
         law: the whole-body control law.
+        program: makes the controller that runs instead of the law, which is without effect then;
+            None for the law.
         posture: (nq,) configuration that the law holds, and that is certified without a motion.
         delays: both connections' delays, with the period of a controller that runs: the hold of
             one that states none counts too.
