@@ -11,7 +11,7 @@ TESTS = {
     "law": "tests/unit/test_whole_body_spaces.py tests/unit/test_whole_body_frozen.py "
            "tests/unit/test_whole_body_law.py tests/unit/test_whole_body_signals.py "
            "tests/unit/test_whole_body_rest.py tests/unit/test_whole_body_tank.py "
-           "tests/unit/test_whole_body_static_ticks.py "
+           "tests/unit/test_whole_body_static_ticks.py tests/unit/test_whole_body_damping.py "
            "tests/unit/test_whole_body_controller.py tests/unit/test_design_cases.py "
            "tests/oracle/test_black_box_corpus.py",
     "margin": "tests/unit/test_margin_delay_margin.py tests/unit/test_design_drift.py "
@@ -29,7 +29,8 @@ TESTS = {
                  "tests/oracle/test_passivity_against_sdp.py",
     "design": "tests/unit/test_design_local.py tests/unit/test_design_motors.py "
               "tests/unit/test_design_thresholds.py tests/unit/test_design_conditions.py "
-              "tests/unit/test_design_jitter.py "
+              "tests/unit/test_design_jitter.py tests/unit/test_design_rates.py "
+              "tests/unit/test_design_joint_pd.py tests/unit/test_design_program.py "
               "tests/unit/test_design_withdrawn.py "
               "tests/unit/test_simulation_scenario_settings.py "
               "tests/unit/test_design_cases.py "
