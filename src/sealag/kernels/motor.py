@@ -57,6 +57,8 @@ class Held(NamedTuple):
     """What the drives hold over a step."""
 
     command: Array  # (n,) tau_osc, Nm
+    later: Array  # (n,) tau_osc from the change on, Nm
+    change: Array  # (1,) when it changes, s after the step's beginning; inf if it does not
     known_torque: Array  # (n,) spring torque of the torque feedback, Nm, if it is delayed
     instant: bool  # whether torque feedback is not delayed
 
@@ -250,15 +252,14 @@ def _expand(motors, j, instant, drive, rotor, link, t, order, series):
 
 
 @inner
-def _half(series, rotor, t, order):
-    """Return the rotor in the middle of a series over a time t that begins at a rotor."""
-    angle, speed, torque, share = rotor.angle, 0.0, 0.0, 1.0
+def _areas(series, order, t):
+    """Return ∫δ and ∫(t − s) δ over a series' time t, δ the way since its beginning."""
+    once = twice = 0.0
     for k in range(order + 1):
-        speed += share * series.speed[k]
-        torque += share * series.torque[k]
-        share *= 0.5
-        angle += share * t * series.speed[k] / (k + 1.0)
-    return Rotor(angle, speed, torque)
+        part = series.speed[k] / ((k + 1.0) * (k + 2.0))
+        once += part
+        twice += part / (k + 3.0)
+    return t**2 * once, t**3 * twice
 
 
 @inner
@@ -284,6 +285,14 @@ def _integrate(series, order, link, t, works):
     return Works(squared, port, shaft, slip, motor)
 
 
+@inner
+def _pieces(motors, j, instant, drive, span):
+    """Return into how many series a time is divided, their length, and their order."""
+    reach = fastest(motors, j, instant, drive.limited) * span
+    pieces = max(1, math.ceil(reach / _REACH))
+    return pieces, span / pieces, _order(reach / pieces)
+
+
 @shared
 def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     """Move rotor j along its link's cubic while its drive does one thing.
@@ -302,9 +311,8 @@ def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     Returns:
         The rotor at the end, and its works.
     """
-    reach = fastest(motors, j, instant, drive.limited) * span
-    pieces = max(1, math.ceil(reach / _REACH))
-    t, order, works = span / pieces, _order(reach / pieces), Works(0.0, 0.0, 0.0, 0.0, 0.0)
+    pieces, t, order = _pieces(motors, j, instant, drive, span)
+    works = Works(0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(pieces):
         here = link_at(link, k * t)
         rotor = _expand(motors, j, instant, drive, rotor, here, t, order, series)
@@ -314,12 +322,12 @@ def travel(motors, j, instant, drive, rotor, link, span, series, booked):
 
 
 @inner
-def choose(motors, j, held, rotor, link):
-    """Return what drive j does from now on, the direction of Coulomb friction (0 for none), and the
-    rotor with the torque that it then has."""
+def choose(motors, j, held, command, rotor, link):
+    """Return what drive j does from now on under a command, the direction of Coulomb friction (0
+    for none), and the rotor with the torque that it then has."""
     ratio, limit, coulomb = motors.ratio[j], motors.torque_limit[j], motors.coulomb[j]
     spring = spring_torque(motors, j, rotor, link.angle, link.speed)
-    u = held.command[j]
+    u = command
     if not held.instant:
         u += (1.0 - ratio) / ratio * held.known_torque[j]
     wanted = ratio * (u - motors.damping[j] * rotor.speed)
@@ -364,25 +372,63 @@ def _reversal(motors, j, instant, drive, rotor, link, time, series):
 
 
 @inner
+def command_of(held, j, late, step):
+    """Return the command of drive j before the change in a step, or after it, and its end, s."""
+    if late == 0:
+        return held.command[j], min(held.change[0], step)
+    return held.later[j], step
+
+
+@inner
 def predict(motors, j, held, rotor, link, step, series):
-    """Return rotor j half a step and a step ahead along its link's motion."""
-    drive, _, rotor = choose(motors, j, held, rotor, link)
-    reach = fastest(motors, j, held.instant, drive.limited) * step
-    if reach <= _REACH:
-        order = _order(reach)
-        whole = _expand(motors, j, held.instant, drive, rotor, link, step, order, series)
-        return _half(series, rotor, step, order), whole
-    half, _ = travel(motors, j, held.instant, drive, rotor, link, 0.5 * step, series, False)
-    link = link_at(link, 0.5 * step)
-    whole, _ = travel(motors, j, held.instant, drive, half, link, 0.5 * step, series, False)
-    return half, whole
+    """Return angle and speed of rotor j for the stages of a Runge-Kutta step, twice in its middle
+    and once at its end.
+
+    A forcing f enters velocities with ∫f and positions with ∫(h − s) f, which the step takes for
+    h (f_0 + 4 f_½ + f_1) / 6 and h² (f_0 + 2 f_½) / 6. The f_½ and f_1 that make both exact are
+    f(½h) and f(h) up to h³; they carry a command that changes inside the step.
+
+    Args:
+        motors: all joints.
+        j: the joint.
+        held: what the drives hold.
+        rotor: at the beginning.
+        link: its motion.
+        step: h, s.
+        series: scratch.
+    """
+    start, begin, once, twice = rotor, 0.0, 0.0, 0.0  # ∫δ and ∫(h − s) δ of the way δ = θ − θ_0
+    for late in range(2):
+        command, end = command_of(held, j, late, step)
+        if end <= begin:
+            continue
+        drive, _, rotor = choose(motors, j, held, command, rotor, link_at(link, begin))
+        pieces, t, order = _pieces(motors, j, held.instant, drive, end - begin)
+        for k in range(pieces):
+            at, way = begin + k * t, rotor.angle - start.angle
+            here, left = link_at(link, at), step - at - t
+            rotor = _expand(motors, j, held.instant, drive, rotor, here, t, order, series)
+            area, moment = _areas(series, order, t)
+            once += t * way + area
+            twice += t * way * (left + 0.5 * t) + left * area + moment
+        begin = end
+    middle, turn = 3.0 * twice / step**2, 3.0 * once / step**2 - 0.5 * start.speed
+    return (
+        Rotor(start.angle + middle, turn, 0.0),
+        Rotor(
+            start.angle + 6.0 * once / step - 4.0 * middle,
+            6.0 * (rotor.angle - start.angle) / step - start.speed - 4.0 * turn,
+            0.0,
+        ),
+    )
 
 
 @inner
 def move(motors, j, held, rotor, link, step, series, flows):
     """Move rotor j over a step along its link's cubic, and write its works.
 
-    Friction that reverses ends a piece of the step; limits act from a piece's beginning.
+    A changing command and friction that reverses end a piece of the step; limits act from a
+    piece's beginning.
 
     Args:
         motors: all joints.
@@ -399,30 +445,36 @@ def move(motors, j, held, rotor, link, step, series, flows):
     """
     flows[:, j] = 0.0
     flows[JOINT_DAMPING, j] = motors.bearing[j] * link_work(link, step)
-    left, here = step, link
-    for _ in range(_TURNS):
-        drive, direction, rotor = choose(motors, j, held, rotor, here)
-        after, works = travel(
-            motors, j, held.instant, drive, rotor, here, left, series, True
-        )  # fmt: skip
-        span, reversing = left, direction != 0.0 and after.speed * direction < 0.0
-        if reversing and rotor.speed == 0.0:  # friction would push it back: it stays
-            drive, reversing = Drive(drive.limited, True, drive.held, 0.0), False
+    begin, command = 0.0, held.command[j]
+    for late in range(2):
+        next_command, end = command_of(held, j, late, step)
+        if end <= begin:
+            continue
+        command = next_command
+        for _ in range(_TURNS):
+            here, left = link_at(link, begin), end - begin
+            drive, direction, rotor = choose(motors, j, held, command, rotor, here)
             after, works = travel(
                 motors, j, held.instant, drive, rotor, here, left, series, True
             )  # fmt: skip
-        elif reversing:
-            span = _reversal(motors, j, held.instant, drive, rotor, here, left, series)
-            after, works = travel(
-                motors, j, held.instant, drive, rotor, here, span, series, True
-            )  # fmt: skip
-        _book(motors, j, works, after.angle - rotor.angle, held.command[j], flows)
-        rotor = Rotor(after.angle, 0.0 if reversing else after.speed, after.torque)
-        here = link_at(here, span)
-        left -= span
-        if not reversing or left <= 1e-12 * step:
-            break
-    _, _, rotor = choose(motors, j, held, rotor, here)
+            span, reversing = left, direction != 0.0 and after.speed * direction < 0.0
+            if reversing and rotor.speed == 0.0:  # friction would push it back: it stays
+                drive, reversing = Drive(drive.limited, True, drive.held, 0.0), False
+                after, works = travel(
+                    motors, j, held.instant, drive, rotor, here, left, series, True
+                )  # fmt: skip
+            elif reversing:
+                span = _reversal(motors, j, held.instant, drive, rotor, here, left, series)
+                after, works = travel(
+                    motors, j, held.instant, drive, rotor, here, span, series, True
+                )  # fmt: skip
+            _book(motors, j, works, after.angle - rotor.angle, command, flows)
+            rotor = Rotor(after.angle, 0.0 if reversing else after.speed, after.torque)
+            begin += span
+            if not reversing or end - begin <= 1e-12 * step:
+                break
+        begin = end
+    _, _, rotor = choose(motors, j, held, command, rotor, link_at(link, step))
     return rotor
 
 

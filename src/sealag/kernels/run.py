@@ -22,7 +22,17 @@ from sealag.kernels.dynamics import KINETIC
 from sealag.kernels.friction import SETTLED, UNSOLVABLE
 from sealag.kernels.ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
 from sealag.kernels.linalg import copy
-from sealag.kernels.plant import GLIDE, MARGIN, SAME, STEP, STORE, accept, act, take_step
+from sealag.kernels.plant import (
+    GLIDE,
+    MARGIN,
+    SAME,
+    STEP,
+    STORE,
+    accept,
+    act,
+    interpolate,
+    take_step,
+)
 from sealag.typing import Array, IntArray
 
 LOAD, SAMPLE, TICK, TAKE = range(4)  # kinds of events, in their order at one instant
@@ -168,6 +178,49 @@ def _happen(physics, channels, event):
 
 
 @inner
+def _passed(physics, channels, event, begin, end):
+    """Return the event that ends a step, and let drives change inside it to the command that is
+    taken there: a step passes samples and one taking."""
+    held = physics.held
+    held.change[0] = np.inf
+    while event < channels.due.size and channels.due[event] < end:
+        kind, tick = channels.kind[event], channels.tick[event]
+        if kind == TAKE and held.change[0] == np.inf:
+            held.change[0] = channels.due[event] - begin
+            copy(channels.commands[tick % channels.commands.shape[0]], held.later)
+        elif kind != SAMPLE:
+            break
+        event += 1
+    return event
+
+
+@inner
+def _pass(physics, channels, event, last, begin, step):
+    """Let the events happen that a step has passed, from one on to a last one."""
+    held = physics.held
+    for k in range(event, last):
+        if channels.kind[k] == SAMPLE:
+            row = channels.samples[channels.tick[k] % channels.samples.shape[0]]
+            interpolate(physics, step, channels.due[k] - begin)
+            write_measurement(physics.between, physics.plant.contacts, channels.due[k], row)
+        else:
+            channels.acting_tick[0] = channels.tick[k]
+    if held.change[0] < np.inf:
+        copy(held.later, held.command)
+        held.change[0] = np.inf
+
+
+@inner
+def _keeps_sliding(physics):
+    """Whether no point begins or ends to slide in the step that was tried."""
+    before, now = physics.memory.yielding, physics.plant.contacts.yielding
+    for i in range(now.size):
+        if (before[i] > 0.0) != (now[i] > 0.0):
+            return False
+    return True
+
+
+@inner
 def _keeps_contacts(physics):
     """Whether no contact changes in the step that was tried."""
     contacts, following = physics.plant.contacts, physics.following
@@ -283,9 +336,10 @@ def move(physics, course, what, length, at, said):
     channels, periods, limits, log = course.channels, course.periods, course.limits, course.log
     same, span = SAME * periods.step, length
     time, step, event, part = at.time, at.step, at.event, at.part
-    begin = time
+    begin, whole = time, False  # only a step from one multiple of the period to the next is whole
     profiled = plant.contacts.ground_x.size > 0 or plant.contacts.closed.size == 0
     while True:
+        first = event
         if what == GLIDE:
             if part == WATCH:
                 part = EVENTS
@@ -309,8 +363,10 @@ def move(physics, course, what, length, at, said):
                     _record(physics, channels, time, log, row)
                 if step == periods.steps:
                     return END, time, Cursor(time, step, event, part)
-                part = MOVE
-            begin, end = time, (step + 1) * periods.step
+                part, whole = MOVE, profiled
+            begin, end, first = time, (step + 1) * periods.step, event
+            if whole:
+                event = _passed(physics, channels, event, begin, end - same)
             time, part = end, WATCH
             if event < channels.due.size and channels.due[event] < end - same:
                 time, part = channels.due[event], INSIDE
@@ -325,7 +381,15 @@ def move(physics, course, what, length, at, said):
         solved = take_step(physics, span)
         if what == STEP:
             return SETTLED if solved else UNSOLVABLE, 0.0, at
-        if not (solved and _keeps_contacts(physics)):
+        done = solved and _keeps_contacts(physics)
+        if not done or (event > first and not _keeps_sliding(physics)):
             copy(physics.memory.yielding, plant.contacts.yielding)
-            return BLOCKED, begin, Cursor(time, step, event, part)
+            if event == first:
+                return BLOCKED, begin, Cursor(time, step, event, part)
+            step -= part == WATCH  # again, in parts that end at its events
+            time, event, part, whole = begin, first, MOVE, False
+            physics.held.change[0] = np.inf
+            continue
+        _pass(physics, channels, first, event, begin, span)
         accept(physics)
+        whole = False
