@@ -103,13 +103,13 @@ def test_each_mode_moves_otherwise():
 def _move(p, z, tau, step, instant=1.0, measured=0.0):
     """Move the rotors of z (n, 9) = [rotor, link, ...]; their rotors (n, 3) and works (9, n)."""
     n = len(p)
-    command = np.full(n, tau)
-    held = motor.Held(command, command, np.full(1, np.inf), np.full(n, measured), bool(instant))
+    command, never = np.full(n, tau), np.full(1, np.inf)
+    held = motor.Held(command, command, never, never, np.full(n, measured), bool(instant))
     flows, moved = np.full((9, n), np.nan), np.zeros((n, 3))
     for j in range(n):
         moved[j] = MOVE(
             motors_of(p), j, held, motor.Rotor(*z[j, :3]), motor.Link(*z[j, 3:7]), step, SERIES(),
-            flows,
+            flows, np.zeros((2, n)),
         )  # fmt: skip
     return moved, flows
 

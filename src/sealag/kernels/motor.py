@@ -59,6 +59,7 @@ class Held(NamedTuple):
     command: Array  # (n,) tau_osc, Nm
     later: Array  # (n,) tau_osc from the change on, Nm
     change: Array  # (1,) when it changes, s after the step's beginning; inf if it does not
+    look: Array  # (1,) when sensors measure inside the step, likewise
     known_torque: Array  # (n,) spring torque of the torque feedback, Nm, if it is delayed
     instant: bool  # whether torque feedback is not delayed
 
@@ -372,14 +373,6 @@ def _reversal(motors, j, instant, drive, rotor, link, time, series):
 
 
 @inner
-def command_of(held, j, late, step):
-    """Return the command of drive j before the change in a step, or after it, and its end, s."""
-    if late == 0:
-        return held.command[j], min(held.change[0], step)
-    return held.later[j], step
-
-
-@inner
 def predict(motors, j, held, rotor, link, step, series):
     """Return angle and speed of rotor j for the stages of a Runge-Kutta step, twice in its middle
     and once at its end.
@@ -399,9 +392,10 @@ def predict(motors, j, held, rotor, link, step, series):
     """
     start, begin, once, twice = rotor, 0.0, 0.0, 0.0  # ∫δ and ∫(h − s) δ of the way δ = θ − θ_0
     for late in range(2):
-        command, end = command_of(held, j, late, step)
+        end = step if late else min(held.change[0], step)
         if end <= begin:
             continue
+        command = held.later[j] if late else held.command[j]
         drive, _, rotor = choose(motors, j, held, command, rotor, link_at(link, begin))
         pieces, t, order = _pieces(motors, j, held.instant, drive, end - begin)
         for k in range(pieces):
@@ -424,11 +418,20 @@ def predict(motors, j, held, rotor, link, step, series):
 
 
 @inner
-def move(motors, j, held, rotor, link, step, series, flows):
+def _stop(held, k, step):
+    """Return the end of the k-th of three parts of a step, s: it ends at a look and a change."""
+    look, change = held.look[0], held.change[0]
+    if k == 2:
+        return step
+    return min(step, min(look, change) if k == 0 else max(look, change))
+
+
+@inner
+def move(motors, j, held, rotor, link, step, series, flows, seen):
     """Move rotor j over a step along its link's cubic, and write its works.
 
-    A changing command and friction that reverses end a piece of the step; limits act from a
-    piece's beginning.
+    A look of sensors, a changing command and friction that reverses end a piece of the step; limits
+    act from a piece's beginning.
 
     Args:
         motors: all joints.
@@ -439,6 +442,7 @@ def move(motors, j, held, rotor, link, step, series, flows):
         step: s.
         series: scratch.
         flows: (9, n) as in ``ledger.JOINT_FLOWS``, J; column j is written.
+        seen: (2, n) angles and speeds at the look, rad, rad/s; column j is written if there is one.
 
     Returns:
         The rotor at the end.
@@ -446,11 +450,11 @@ def move(motors, j, held, rotor, link, step, series, flows):
     flows[:, j] = 0.0
     flows[JOINT_DAMPING, j] = motors.bearing[j] * link_work(link, step)
     begin, command = 0.0, held.command[j]
-    for late in range(2):
-        next_command, end = command_of(held, j, late, step)
+    for k in range(3):
+        end = _stop(held, k, step)
         if end <= begin:
             continue
-        command = next_command
+        command = held.command[j] if begin < held.change[0] else held.later[j]
         for _ in range(_TURNS):
             here, left = link_at(link, begin), end - begin
             drive, direction, rotor = choose(motors, j, held, command, rotor, here)
@@ -474,6 +478,8 @@ def move(motors, j, held, rotor, link, step, series, flows):
             if not reversing or end - begin <= 1e-12 * step:
                 break
         begin = end
+        if end == held.look[0]:
+            seen[0, j], seen[1, j] = rotor.angle, rotor.speed
     _, _, rotor = choose(motors, j, held, command, rotor, link_at(link, step))
     return rotor
 

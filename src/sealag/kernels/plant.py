@@ -55,7 +55,7 @@ class Memory(NamedTuple):
     speed: Array  # (2, n)
     gained: Ledger  # works of the step; its stores are scratch
     series: Series
-    unbooked: Array  # (9, n) works until a measurement inside the step: scratch
+    seen: Array  # (2, n) motor angles and speeds where sensors look
     yielding: Array  # (P,) at the step's beginning
 
 
@@ -106,13 +106,13 @@ def allocate_physics(plant: Plant, *, instant: bool) -> Physics:
         rates=np.zeros((4, nv)), accelerations=np.zeros((4, nv)), powers=np.zeros((4, 4)),
         displacement=np.zeros(nv), angle=np.zeros((2, n)), speed=np.zeros((2, n)),
         gained=allocate_ledger(n), series=motor.allocate_series(),
-        unbooked=np.zeros((len(JOINT_FLOWS), n)), yielding=np.zeros(points),
+        seen=np.zeros((2, n)), yielding=np.zeros(points),
     )  # fmt: skip
     return Physics(
         plant=plant, work=work, now=now, following=following, between=between,
         held=Held(
             command=np.zeros(n), later=np.zeros(n), change=np.full(1, np.inf),
-            known_torque=np.zeros(n), instant=instant,
+            look=np.full(1, np.inf), known_torque=np.zeros(n), instant=instant,
         ),
         ledger=allocate_ledger(n), memory=memory,
     )  # fmt: skip
@@ -147,21 +147,22 @@ def _close(plant, now, held, step, memory, following):
         link = motor.link_through(now.q[q], now.v[v], following.q[q], following.v[v], step)
         rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
         rotor = motor.move(
-            plant.motors, j, held, rotor, link, step, memory.series, memory.gained.joint
+            plant.motors, j, held, rotor, link, step, memory.series, memory.gained.joint,
+            memory.seen,
         )
         following.theta[j], following.theta_dot[j] = rotor.angle, rotor.speed
         following.tau_motor[j] = rotor.torque
 
 
 @inner
-def interpolate(physics, step, t):
-    """Write the state and the spring torques at a time t (s) inside the step that was tried.
+def interpolate(physics, step):
+    """Write state and spring torques at the look inside the step that was tried.
 
     Links move along the cubic through angles and speeds at both ends, as motors are moved; their
     speeds are the cubic through speeds and accelerations.
     """
-    plant, now, following, memory = (
-        physics.plant, physics.now, physics.following, physics.memory,
+    now, following, memory, t = (
+        physics.now, physics.following, physics.memory, physics.held.look[0],
     )  # fmt: skip
     at, n, nv = physics.between, now.theta.size, now.v.size
     base, rate, u = nv - n, memory.rates[1], memory.rates[2]
@@ -176,13 +177,9 @@ def interpolate(physics, step, t):
     spatial.integrate(now.q, u, base, at.q)
     for j in range(n):
         q, v = now.q.size - n + j, base + j
-        link = motor.link_through(now.q[q], now.v[v], following.q[q], following.v[v], step)
-        rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
-        rotor = motor.move(
-            plant.motors, j, physics.held, rotor, link, t, memory.series, memory.unbooked
-        )
+        rotor = Rotor(memory.seen[0, j], memory.seen[1, j], 0.0)
         at.theta[j], at.theta_dot[j] = rotor.angle, rotor.speed
-        at.tau_sea[j] = motor.spring_torque(plant.motors, j, rotor, at.q[q], at.v[v])
+        at.tau_sea[j] = motor.spring_torque(physics.plant.motors, j, rotor, at.q[q], at.v[v])
 
 
 @inner

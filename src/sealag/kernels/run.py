@@ -178,36 +178,34 @@ def _happen(physics, channels, event):
 
 
 @inner
-def _passed(physics, channels, event, begin, end):
-    """Return the event that ends a step, and let drives change inside it to the command that is
-    taken there: a step passes samples and one taking."""
-    held = physics.held
-    held.change[0] = np.inf
+def _passed(held, channels, event, begin, end):
+    """Return the event that ends a step, and prepare drives and sensors for those before: a step
+    passes one sample and one taking."""
     while event < channels.due.size and channels.due[event] < end:
-        kind, tick = channels.kind[event], channels.tick[event]
+        kind, after = channels.kind[event], channels.due[event] - begin
         if kind == TAKE and held.change[0] == np.inf:
-            held.change[0] = channels.due[event] - begin
+            held.change[0] = after
+            tick = channels.tick[event]
             copy(channels.commands[tick % channels.commands.shape[0]], held.later)
-        elif kind != SAMPLE:
+        elif kind == SAMPLE and held.look[0] == np.inf:
+            held.look[0] = after
+        else:
             break
         event += 1
     return event
 
 
 @inner
-def _pass(physics, channels, event, last, begin, step):
+def _pass(physics, channels, event, last, step):
     """Let the events happen that a step has passed, from one on to a last one."""
-    held = physics.held
     for k in range(event, last):
         if channels.kind[k] == SAMPLE:
+            interpolate(physics, step)
             row = channels.samples[channels.tick[k] % channels.samples.shape[0]]
-            interpolate(physics, step, channels.due[k] - begin)
             write_measurement(physics.between, physics.plant.contacts, channels.due[k], row)
         else:
+            copy(physics.held.later, physics.held.command)
             channels.acting_tick[0] = channels.tick[k]
-    if held.change[0] < np.inf:
-        copy(held.later, held.command)
-        held.change[0] = np.inf
 
 
 @inner
@@ -366,7 +364,7 @@ def move(physics, course, what, length, at, said):
                 part, whole = MOVE, profiled
             begin, end, first = time, (step + 1) * periods.step, event
             if whole:
-                event = _passed(physics, channels, event, begin, end - same)
+                event = _passed(physics.held, channels, event, begin, end - same)
             time, part = end, WATCH
             if event < channels.due.size and channels.due[event] < end - same:
                 time, part = channels.due[event], INSIDE
@@ -387,9 +385,9 @@ def move(physics, course, what, length, at, said):
             if event == first:
                 return BLOCKED, begin, Cursor(time, step, event, part)
             step -= part == WATCH  # again, in parts that end at its events
-            time, event, part, whole = begin, first, MOVE, False
-            physics.held.change[0] = np.inf
-            continue
-        _pass(physics, channels, first, event, begin, span)
-        accept(physics)
+            time, event, part = begin, first, MOVE
+        else:
+            _pass(physics, channels, first, event, span)
+            accept(physics)
+        physics.held.change[0] = physics.held.look[0] = np.inf
         whole = False
