@@ -117,7 +117,7 @@ class Controller:
         energy, joints = self._signal.present(measurement, command)
         match self.law.gravity:
             case GravityCompensation.PLANNED:
-                energy -= float(self._law.planned_gravity @ joints)
+                energy -= float(self._law.planned_gravity.dot(joints))
             case GravityCompensation.FEEDBACK:
                 energy -= self._law.work_of_gravity(measurement.q, joints)
         return energy

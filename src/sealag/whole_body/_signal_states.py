@@ -174,8 +174,9 @@ class MeasuredAngles:
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command of the true state."""
         self.command(0.0, measurement, out)
-        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
-        return Present(energy, self._joints(measurement.q, measurement.theta))
+        return Present(
+            self._law.task_energy(), self._joints(measurement.q, measurement.theta)
+        )
 
     def deflection(self, carried: Array) -> Array:
         """Return 0 for motor angles, K⁻¹ ḡ for link angles."""
@@ -183,17 +184,22 @@ class MeasuredAngles:
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
         """Write the command of a state that does not move."""
+        self._law.follow(q)
+        self._settle(q, theta, out)
+
+    def _settle(self, q: Array, theta: Array, out: Array) -> None:
+        """The same, from the motions along which the base followed the joints of a state nearby."""
         law, joints = self._law, self._joints(q, theta)
         away = joints - law.robot.joint_positions(q)
-        law.follow(q)
         law.settled(lambda: law.at(q, joints, out), lambda: away)
 
     def derivative(
         self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
     ) -> LawDerivative:
         """Differentiate the settled command."""
+        self._law.follow(q)
         return LawDerivative.memoryless(
-            *_differences(self._law, self.settled, q, theta, 0.0 if rough else width)
+            *_differences(self._law, self._settle, q, theta, 0.0 if rough else width)
         )
 
 
@@ -247,8 +253,8 @@ class StaticState:
         """Write the command at the settled q̄: V_3 at q̄ less ½ lᵀ K⁻¹ l."""
         sag = self.followed.sag.copy()
         self._law.static(measurement.q, measurement.theta, sag, out)
-        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
-        energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
+        energy = self._law.task_energy()
+        energy -= 0.5 * float(out.dot(out / self._law.spring_stiffness))
         return Present(energy, measurement.theta + sag)
 
     def deflection(self, carried: Array) -> Array:
@@ -309,8 +315,7 @@ class TankState:
             carried = law.space.J_star @ (measurement.theta - static.theta)
             law.error[:] = law.wanted - tank.position - carried
         law.torque(out)
-        energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy
-        return Present(energy, measurement.theta)
+        return Present(law.task_energy() + tank.energy, measurement.theta)
 
     def deflection(self, carried: Array) -> Array:
         """Return that of q̄(θ)."""
