@@ -10,8 +10,9 @@ _ROUNDING = 1e-13
 """Of the trace: what a Cholesky factorisation leaves. Ten times smaller takes rounding for rank;
 ten times larger drops directions that the rank tolerance of tasks, 1e-9, is to decide about."""
 _NOTHING = 1e-34
-"""Square of the share of two diagonal entries below which the one beside them is rounding. A hundred
-times larger shows in the last digit of eigenvalues; a hundred times smaller turns what is 0."""
+"""Square of the share of two diagonal entries below which the one beside them is rounding. A
+hundred times larger shows in the last digit of eigenvalues; a hundred times smaller turns what is
+0."""
 _WORST_CONDITION = 1e4
 """Up to which A⁺ through G⁻² loses no more than six digits; ten times more loses eight."""
 
@@ -131,7 +132,8 @@ def invert_spd(A, out, factor):
 
 @inner
 def jacobi_eigh(A, values, vectors):
-    """Eigenvalues and eigenvectors (columns) of a symmetric A (n, n); its upper part is overwritten.
+    """Eigenvalues and eigenvectors (columns) of a symmetric A (n, n), of which the upper part is
+    read and overwritten.
 
     Cyclic Jacobi rotations. Convergence is quadratic: once the off-diagonal part is below 1e-9 of
     the diagonal, one more sweep takes it below rounding.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.kernels import motor, spatial
+from sealag.kernels import motor, motor_step, spatial
 from sealag.kernels._jit import entry, inner
 from sealag.kernels.contact import (
     Instant,
@@ -33,7 +33,8 @@ from sealag.kernels.ledger import (
     Ledger,
 )
 from sealag.kernels.linalg import copy
-from sealag.kernels.motor import Held, Rotor, Series
+from sealag.kernels.motor import Rotor, Series
+from sealag.kernels.motor_step import Held
 from sealag.typing import Array
 
 MARGIN = 1e-9
@@ -128,7 +129,7 @@ def _predict_motors(plant, now, held, step, memory):
             now.q[first_q + j], now.v[first_v + j], now.acceleration[first_v + j], 0.0
         )
         rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
-        half, whole = motor.predict(motors, j, held, rotor, link, step, memory.series)
+        half, whole = motor_step.predict(motors, j, held, rotor, link, step, memory.series)
         memory.angle[0, j], memory.speed[0, j] = half.angle, half.speed
         memory.angle[1, j], memory.speed[1, j] = whole.angle, whole.speed
 
@@ -146,8 +147,15 @@ def _close(plant, now, held, step, memory, following):
         q, v = first_q + j, first_v + j
         link = motor.link_through(now.q[q], now.v[v], following.q[q], following.v[v], step)
         rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
-        rotor = motor.move(
-            plant.motors, j, held, rotor, link, step, memory.series, memory.gained.joint,
+        rotor = motor_step.move(
+            plant.motors,
+            j,
+            held,
+            rotor,
+            link,
+            step,
+            memory.series,
+            memory.gained.joint,
             memory.seen,
         )
         following.theta[j], following.theta_dot[j] = rotor.angle, rotor.speed

@@ -212,10 +212,10 @@ def _pass(physics, channels, event, last, step):
 def _keeps_sliding(physics):
     """Whether no point begins or ends to slide in the step that was tried."""
     before, now = physics.memory.yielding, physics.plant.contacts.yielding
+    same = True
     for i in range(now.size):
-        if (before[i] > 0.0) != (now[i] > 0.0):
-            return False
-    return True
+        same = same and (before[i] > 0.0) == (now[i] > 0.0)
+    return same
 
 
 @inner

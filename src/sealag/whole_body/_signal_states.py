@@ -174,9 +174,7 @@ class MeasuredAngles:
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command of the true state."""
         self.command(0.0, measurement, out)
-        return Present(
-            self._law.task_energy(), self._joints(measurement.q, measurement.theta)
-        )
+        return Present(self._law.task_energy(), self._joints(measurement.q, measurement.theta))
 
     def deflection(self, carried: Array) -> Array:
         """Return 0 for motor angles, K⁻¹ ḡ for link angles."""
@@ -309,7 +307,7 @@ class TankState:
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command with x̂ carried on by J* from the last measured θ to the true one."""
         law, tank, static = self._law, self._tank, self._static.followed
-        energy, _ = self._static.present(measurement, out)
+        self._static.present(measurement, out)
         self._matrices(measurement.q, measurement.theta)
         if static.started[0]:
             carried = law.space.J_star @ (measurement.theta - static.theta)
