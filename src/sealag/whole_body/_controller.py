@@ -93,9 +93,13 @@ class Controller:
         rate = self._refer(t)
         self._signal.command(t, measurement, out)
         self._law.keep_following()
-        if rate is not None and self.law.velocity_feedforward:
+        if rate is not None:
             rate = np.array(rate, dtype=float)
             self._law.leave_to_higher(rate)
+        if self.law.damped:
+            links = self.law.signal.of_links
+            out += self._law.drag(measurement.v_joint if links else measurement.theta_dot, rate)
+        if rate is not None and self.law.velocity_feedforward:
             theta_dot = np.linalg.lstsq(self._law.space.J_star, rate, rcond=1e-6)[0]
             out += self._motor_damping * theta_dot
 

@@ -1,6 +1,6 @@
 """Running signals: the fed-back angles from tick to tick, and the law's derivative at rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -36,7 +36,7 @@ class Present(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawDerivative:
     """The law about a state at rest, with memory ξ: ξ̇ = A ξ + B_q δq + B_theta δθ + B_rate δθ̇ and
-    δτ_osc = C ξ + C_q δq + C_theta δθ.
+    δτ_osc = C ξ + C_q δq + C_theta δθ + C_v δv + C_rate δθ̇.
 
     Attributes:
         A: (s, s) 1/s; s = 0 for a law without memory.
@@ -46,6 +46,8 @@ class LawDerivative:
         C: (n, s).
         C_q: (n, nv) along tangent motions, Nm/rad.
         C_theta: (n, n), Nm/rad.
+        C_v: (n, nv) of tangent velocities, Nms/rad.
+        C_rate: (n, n) of motor velocities, Nms/rad.
     """
 
     A: Array
@@ -55,10 +57,12 @@ class LawDerivative:
     C: Array
     C_q: Array
     C_theta: Array
+    C_v: Array
+    C_rate: Array
 
     @classmethod
     def memoryless(cls, C_q: Array, C_theta: Array) -> "LawDerivative":
-        """Return the derivative of a law without memory.
+        """Return the derivative of a law without memory that feels no rates.
 
         Args:
             C_q: (n, nv).
@@ -68,8 +72,21 @@ class LawDerivative:
         none = np.zeros((0, n))
         return cls(
             A=np.zeros((0, 0)), B_q=np.zeros((0, nv)), B_theta=none, B_rate=none, C=none.T,
-            C_q=C_q, C_theta=C_theta,
+            C_q=C_q, C_theta=C_theta, C_v=np.zeros((n, nv)), C_rate=np.zeros((n, n)),
         )  # fmt: skip
+
+    def with_drag(self, slope: Array, *, of_links: bool) -> "LawDerivative":
+        """Return the derivative of the law with damping that is computed from rates.
+
+        Args:
+            slope: (n, n) its command by joint rates, Nms/rad.
+            of_links: whether the rates are those of the links.
+        """
+        if not of_links:
+            return replace(self, C_rate=slope)
+        C_v = np.zeros_like(self.C_v)
+        C_v[:, C_v.shape[1] - len(slope) :] = slope
+        return replace(self, C_v=C_v)
 
     def change(self, other: "LawDerivative") -> float:
         """Return how far another derivative of the same law lies from this one, as a share of it.
@@ -362,5 +379,5 @@ class TankState:
         rate = self._tank.rate
         return LawDerivative(
             A=-rate * np.eye(m), B_q=rate * T_q, B_theta=rate * T_theta, B_rate=J, C=C,
-            C_q=C_q, C_theta=C_theta,
+            C_q=C_q, C_theta=C_theta, C_v=np.zeros_like(C_q), C_rate=np.zeros_like(C_theta),
         )  # fmt: skip
