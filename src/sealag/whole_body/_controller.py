@@ -56,6 +56,7 @@ class Controller:
         self._law = LawEvaluation(
             robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
         )
+        self._damped = law.damped  # asked of the tasks once, not at each tick
         self._signal = law.signal.start(self._law, delay_bound=delay_bound)
 
     @property
@@ -96,7 +97,7 @@ class Controller:
         if rate is not None:
             rate = np.array(rate, dtype=float)
             self._law.leave_to_higher(rate)
-        if self.law.damped:
+        if self._damped:
             links = self.law.signal.of_links
             out += self._law.drag(measurement.v_joint if links else measurement.theta_dot, rate)
         if rate is not None and self.law.velocity_feedforward:
@@ -121,7 +122,7 @@ class Controller:
         energy, joints = self._signal.present(measurement, command)
         match self.law.gravity:
             case GravityCompensation.PLANNED:
-                energy -= float(self._law.planned_gravity @ joints)
+                energy -= float(self._law.planned_gravity.dot(joints))
             case GravityCompensation.FEEDBACK:
                 energy -= self._law.work_of_gravity(measurement.q, joints)
         return energy

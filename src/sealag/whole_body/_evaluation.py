@@ -230,6 +230,10 @@ class LawEvaluation:
             if turned < SETTLED:
                 return
 
+    def task_energy(self) -> float:
+        """Return ½ x̃ᵀ S x̃ of the current error and matrices, J."""
+        return 0.5 * float(self.error.dot(self.space.stiffness.dot(self.error)))
+
     def torque(self, out: Array) -> None:
         """Write l (n,) of the current error and matrices."""
         space = self.space

@@ -16,6 +16,10 @@ STEP = 2e-5
 base. Near singular postures, where the law bends within 1e-3 rad, plain differences of 1e-5 rad
 leave 1e-5 of the derivative; these leave 5e-9, of which half is rounding."""
 
+_ROUGH = 1e-6
+"""rad, m: step of one-sided differences. Ten times larger leaves 1e-2 of the derivative where the
+law bends within 1e-3 rad, ten times smaller 1e-5 by rounding of the settled command."""
+
 
 class Present(NamedTuple):
     """What the law would command without delay.
@@ -144,13 +148,16 @@ class SignalState(Protocol):
         """
         ...
 
-    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
+    def derivative(
+        self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
+    ) -> LawDerivative:
         """Return the derivative of what runs, about a state that does not move.
 
         Args:
             q: (nq,) configuration.
             theta: (n,) motor angles, rad.
             width: half the base of the central differences, rad and m.
+            rough: one-sided differences instead, as Newton's method needs: a fourth of the cost.
         """
         ...
 
@@ -184,8 +191,7 @@ class MeasuredAngles:
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command of the true state."""
         self.command(0.0, measurement, out)
-        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
-        return Present(energy, self._joints(measurement.q, measurement.theta))
+        return Present(self._law.task_energy(), self._joints(measurement.q, measurement.theta))
 
     def deflection(self, carried: Array) -> Array:
         """Return 0 for motor angles, K⁻¹ ḡ for link angles."""
@@ -193,35 +199,46 @@ class MeasuredAngles:
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
         """Write the command of a state that does not move."""
+        self._law.follow(q)
+        self._settle(q, theta, out)
+
+    def _settle(self, q: Array, theta: Array, out: Array) -> None:
+        """The same, from the motions along which the base followed the joints of a state nearby."""
         law, joints = self._law, self._joints(q, theta)
         away = joints - law.robot.joint_positions(q)
-        law.follow(q)
         law.settled(lambda: law.at(q, joints, out), lambda: away)
 
-    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
+    def derivative(
+        self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
+    ) -> LawDerivative:
         """Differentiate the settled command."""
-        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta, width))
+        self._law.follow(q)
+        return LawDerivative.memoryless(
+            *_differences(self._law, self._settle, q, theta, 0.0 if rough else width)
+        )
 
 
 def _differences(
     law: LawEvaluation, function, q: Array, theta: Array, width: float, *, rows: int = 0
 ):
     """∂f/∂q (k, nv) and ∂f/∂θ (k, n) of function(q, θ, out), by central differences extrapolated to
-    none: (4 D(h/2) − D(h)) / 3."""
+    none: (4 D(h/2) − D(h)) / 3; by one-sided ones of `_ROUGH` where the width is 0."""
     robot = law.robot
-    k = rows or robot.n
-    ahead, behind = np.zeros(k), np.zeros(k)
-    by_q, by_theta = np.zeros((k, robot.nv)), np.zeros((k, robot.n))
-    for h, share in ((width / 2.0, 4.0 / 3.0), (width, -1.0 / 3.0)):
-        for i, step in enumerate(h * np.eye(robot.nv)):
-            function(robot.integrate(q, step), theta, ahead)
-            function(robot.integrate(q, -step), theta, behind)
-            by_q[:, i] += share * (ahead - behind) / (2.0 * h)
-        for i, step in enumerate(h * np.eye(robot.n)):
-            function(q, theta + step, ahead)
-            function(q, theta - step, behind)
-            by_theta[:, i] += share * (ahead - behind) / (2.0 * h)
-    return by_q, by_theta
+    k, nv, eye = rows or robot.n, robot.nv, np.eye(robot.nv + robot.n)
+    weights = [(_ROUGH, 1.0 / _ROUGH), (0.0, -1.0 / _ROUGH)]
+    if width:
+        near, far = 4.0 / (3.0 * width), 1.0 / (6.0 * width)
+        weights = [(width / 2.0, near), (-width / 2.0, -near), (width, -far), (-width, far)]
+    found, out, here = np.zeros((k, nv + robot.n)), np.zeros(k), np.zeros(k)
+    function(q, theta, here)
+    for i, direction in enumerate(eye):
+        for h, weight in weights:
+            out[:] = here
+            if h:
+                step = h * direction
+                function(robot.integrate(q, step[:nv]) if i < nv else q, theta + step[nv:], out)
+            found[:, i] += weight * out
+    return found[:, :nv], found[:, nv:]
 
 
 class StaticState:
@@ -251,8 +268,8 @@ class StaticState:
         """Write the command at the settled q̄: V_3 at q̄ less ½ lᵀ K⁻¹ l."""
         sag = self.followed.sag.copy()
         self._law.static(measurement.q, measurement.theta, sag, out)
-        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
-        energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
+        energy = self._law.task_energy()
+        energy -= 0.5 * float(out.dot(out / self._law.spring_stiffness))
         return Present(energy, measurement.theta + sag)
 
     def deflection(self, carried: Array) -> Array:
@@ -267,9 +284,13 @@ class StaticState:
         law.follow(q)
         law.settled(lambda: law.static(q, theta, sag, out), lambda: theta + sag - joints)
 
-    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
+    def derivative(
+        self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
+    ) -> LawDerivative:
         """Differentiate the settled command."""
-        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta, width))
+        return LawDerivative.memoryless(
+            *_differences(self._law, self.settled, q, theta, 0.0 if rough else width)
+        )
 
 
 class TankState:
@@ -303,14 +324,13 @@ class TankState:
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command with x̂ carried on by J* from the last measured θ to the true one."""
         law, tank, static = self._law, self._tank, self._static.followed
-        energy, _ = self._static.present(measurement, out)
+        self._static.present(measurement, out)
         self._matrices(measurement.q, measurement.theta)
         if static.started[0]:
             carried = law.space.J_star @ (measurement.theta - static.theta)
             law.error[:] = law.wanted - tank.position - carried
         law.torque(out)
-        energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy
-        return Present(energy, measurement.theta)
+        return Present(law.task_energy() + tank.energy, measurement.theta)
 
     def deflection(self, carried: Array) -> Array:
         """Return that of q̄(θ)."""
@@ -337,13 +357,15 @@ class TankState:
         law.error[:] = law.wanted - position
         law.torque(out)
 
-    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
+    def derivative(
+        self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
+    ) -> LawDerivative:
         """Return x̂̇ = J* θ̇ + rate (x(q̄) − x̂) while the tank can pay, and x̂ = J* θ while it cannot.
 
         What the tank holds changes with the square of the motion, so that near a rest it pays for
         all that u does as long as it holds anything.
         """
-        law, m = self._law, self._law.rows
+        law, m, width = self._law, self._law.rows, 0.0 if rough else width
         target, command = np.zeros(m), np.zeros(law.robot.n)
         self._target(q, theta, target)
         C_q, C_theta = _differences(
