@@ -67,6 +67,11 @@ FLOATING = {
 }
 TANK = {"controller.feedback": "static_joint_tank", "controller.gravity": "none"}
 PUSH = {"frame": "tip", "force_n": [1.0, 0.0, 0.0], "start_s": 0.1, "duration_s": 0.1}
+JOINT_PD = {
+    "controller": {"kind": "joint_pd", "gravity": "planned", "kp": 60.0, "kd": 1.0},
+    "tasks": None,
+}
+PROGRAM = {"controller": {"kind": "python", "file": "mine.py"}, "tasks": None}
 WALK = {"walking": {"feet": ["tip", "side"]}}
 ROUGH, STAIRS = {"kind": "rough"}, {"kind": "stairs", "rises_m": [0.1]}
 PRINTED = {"tasks": [{"name": "x", "kind": "posture", "stiffness": [50.0, 9.0]}]}
@@ -102,8 +107,13 @@ CHANGES: list[tuple[str, dict[str, Any], Any]] = [
     ("controller.tank_flow", TANK, "published"),
     ("controller.tank_energy_j", TANK, 0.0),
     ("controller.tank_rate", TANK, 50.0),
+    *((f"controller.{key}", JOINT_PD, value) for key, value in (
+        ("kp", 80.0), ("kd", 3.0), ("damping_at", "drive"))),
+    *((f"controller.{key}", PROGRAM, value) for key, value in (
+        ("file", "other.py"), ("function", "other"))),
     ("tasks.kind", {}, "com"),
     ("tasks.stiffness", {}, 60.0),
+    ("tasks.damping", {}, 2.0),
     ("tasks.frame", {}, "lower"),
     ("tasks.joints", PRINTED | {"tasks": [{"name": "x", "kind": "posture", "stiffness": 9.0}]},
      ["j1"]),
@@ -223,6 +233,7 @@ def folder(tmp_path_factory):
     (made / "other.urdf").write_text(
         URDF.format(**PLAIN).replace('mass value="2"', 'mass value="4"')
     )
+    (made / "mine.py").write_text("def controller(system):\n    return None\n")
     (made / "samples.txt").write_text("4\n5\n6\n7\n")
     (made / "longer.txt").write_text("8\n9\n9\n9\n")
     (made / "one.csv").write_text("time_s,j1,j2\n0,0.4,0.5\n1,0.5,0.5\n")

@@ -11,7 +11,7 @@ TESTS = {
     "law": "tests/unit/test_whole_body_spaces.py tests/unit/test_whole_body_frozen.py "
            "tests/unit/test_whole_body_law.py tests/unit/test_whole_body_signals.py "
            "tests/unit/test_whole_body_rest.py tests/unit/test_whole_body_tank.py "
-           "tests/unit/test_whole_body_static_ticks.py "
+           "tests/unit/test_whole_body_static_ticks.py tests/unit/test_whole_body_damping.py "
            "tests/unit/test_whole_body_controller.py tests/unit/test_design_cases.py "
            "tests/oracle/test_black_box_corpus.py",
     "margin": "tests/unit/test_margin_delay_margin.py tests/unit/test_design_drift.py "
@@ -29,7 +29,8 @@ TESTS = {
                  "tests/oracle/test_passivity_against_sdp.py",
     "design": "tests/unit/test_design_local.py tests/unit/test_design_motors.py "
               "tests/unit/test_design_thresholds.py tests/unit/test_design_conditions.py "
-              "tests/unit/test_design_jitter.py "
+              "tests/unit/test_design_jitter.py tests/unit/test_design_rates.py "
+              "tests/unit/test_design_joint_pd.py tests/unit/test_design_program.py "
               "tests/unit/test_design_withdrawn.py "
               "tests/unit/test_simulation_scenario_settings.py "
               "tests/unit/test_design_cases.py "
@@ -242,10 +243,10 @@ MUTANTS = [
          "derivative of the tank"),
         ("return carried / self._law.spring_stiffness if self._links else np.zeros_like(carried)",
          "return np.zeros_like(carried)", "where link angles let springs rest"),
-        ("energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))", "pass",
+        ("energy -= 0.5 * float(out.dot(out / self._law.spring_stiffness))", "pass",
          "potential of q̄(θ)"),
-        ("for h, share in ((width / 2.0, 4.0 / 3.0), (width, -1.0 / 3.0)):",
-         "for h, share in ((width / 2.0, 2.0 / 3.0), (width, 1.0 / 3.0)):",
+        ("near, far = 4.0 / (3.0 * width), 1.0 / (6.0 * width)",
+         "near, far = 2.0 / (3.0 * width), -1.0 / (6.0 * width)",
          "extrapolated differences: accuracy only"),
     ),
     *_of(
@@ -455,10 +456,17 @@ MUTANTS = [
          "injection[rows] = command[rows].sum(axis=1)", "what the delay injects"),
         ("own[rows] = given + potential[rows] - potential[:1]",
          "own[rows] = given + potential[rows]", "what the law injects"),
-        ("return 0.5 * (start[1] + end[1]) * (end[0] - start[0])",
-         "return start[1] * (end[0] - start[0])", "the trapezoid"),
+        ("return 0.5 * (start[1] + end[1]), end[0] - start[0]",
+         "return start[1], end[0] - start[0]", "the trapezoid"),
         ("lambda row: damping[row] - command[row]", "lambda row: command[row] - damping[row]",
          "the joint that is named on the joint side"),
+    ),
+    *_of(
+        "actuation", "kernels/motor_step.py",
+        ("3.0 * once / step**2 - 0.5 * start.speed", "(rotor.angle - start.angle) / step",
+         "speeds at the middle of a step"),
+        ("command = held.command[j] if begin < held.change[0] else held.later[j]",
+         "command = held.command[j]", "a command that changes inside a step"),
     ),
     *_of(
         "simulation", "simulation/_network.py",

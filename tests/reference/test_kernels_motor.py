@@ -6,7 +6,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 
 from helpers.kernels import from_python
-from sealag.kernels import motor
+from sealag.kernels import motor, motor_step
 from sealag.kernels.ledger import (
     COMMAND,
     COULOMB,
@@ -22,7 +22,10 @@ from sealag.kernels.ledger import (
 COLUMNS = (
     "K", "D_s", "B", "ratio", "D", "viscous", "coulomb", "limit", "speed", "bandwidth", "bearing",
 )  # fmt: skip
-TRAVEL, MOVE, RATES = (from_python(kernel) for kernel in (motor.travel, motor.move, motor.rates))
+TRAVEL, MOVE, RATES = (
+    from_python(kernel) for kernel in (motor.travel, motor_step.move, motor.rates)
+)
+PREDICT = from_python(motor_step.predict)
 LINK_WORK, SERIES = from_python(motor.link_work), motor.allocate_series
 
 
@@ -100,15 +103,22 @@ def test_each_mode_moves_otherwise():
     assert len(ends) == 4
 
 
+def _held(tau, later, *, change=np.inf, look=np.inf, measured=0.0, instant=True):
+    """What one drive holds over a step."""
+    values = (np.full(1, value) for value in (tau, later, change, look, measured))
+    return motor_step.Held(*values, instant)
+
+
 def _move(p, z, tau, step, instant=1.0, measured=0.0):
     """Move the rotors of z (n, 9) = [rotor, link, ...]; their rotors (n, 3) and works (9, n)."""
     n = len(p)
-    held = motor.Held(np.full(n, tau), np.full(n, measured), bool(instant))
+    command, never = np.full(n, tau), np.full(1, np.inf)
+    held = motor_step.Held(command, command, never, never, np.full(n, measured), bool(instant))
     flows, moved = np.full((9, n), np.nan), np.zeros((n, 3))
     for j in range(n):
         moved[j] = MOVE(
             motors_of(p), j, held, motor.Rotor(*z[j, :3]), motor.Link(*z[j, 3:7]), step, SERIES(),
-            flows,
+            flows, np.zeros((2, n)),
         )  # fmt: skip
     return moved, flows
 
@@ -201,7 +211,7 @@ def test_every_work_has_its_own_coefficient():
     p = rng.uniform(1, 2, (2, 11))
     motors = motors_of(p)
     for j in (0, 1):
-        from_python(motor._book)(motors, j, works, way, 3.0, flows)
+        from_python(motor_step._book)(motors, j, works, way, 3.0, flows)
     expected = np.zeros((9, 2))
     one = np.ones(2)
     expected[PORT], expected[SHAFT] = works.port * one, works.shaft * one
@@ -224,3 +234,62 @@ def test_late_torque_feedback_is_held():
     expected = _simulate(p, z[0].copy(), 5.0, 2e-3, instant=0, measured=3.0)
     moved, _ = _move(p, z, 5.0, 2e-3, instant=0.0, measured=3.0)
     np.testing.assert_allclose(moved[0, :2], expected[:2], rtol=1e-6, atol=1e-8)
+
+
+STARTS = (motor.Rotor(0.1, 0.3, 0.0), motor.Link(0.08, 0.5, -2.0, 30.0))
+
+
+@pytest.mark.parametrize(("change", "look"), [(0.3e-3, 0.7e-3), (0.7e-3, 0.3e-3), (0.5e-3, 0.5e-3)])
+@pytest.mark.parametrize("coulomb", [0.0, 1.5])
+def test_a_command_that_changes_inside_a_step_makes_it_two(change, look, coulomb):
+    """End and works are those of two steps; what sensors see is the end of one that ends there."""
+    motors, (rotor, link), step = motors_of(parameters(coulomb=coulomb)), STARTS, 1e-3
+    seen, flows = np.zeros((2, 1)), np.zeros((9, 1))
+    held = _held(12.0, -30.0, change=change, look=look)
+    end = MOVE(motors, 0, held, rotor, link, step, SERIES(), flows, seen)
+
+    def parts(until):
+        at, work, here = rotor, np.zeros((9, 1)), 0.0
+        for tau, there in ((12.0, min(change, until)), (-30.0, until)):
+            if there > here:
+                part, moved = np.zeros((9, 1)), motor.link_at.py_func(link, here)
+                span = there - here
+                at = MOVE(motors, 0, _held(tau, tau), at, moved, span, SERIES(), part, seen.copy())
+                work, here = work + part, there
+        return at, work
+
+    expected, work = parts(step)
+    np.testing.assert_allclose(end, expected, rtol=1e-9)  # a reversal is found to 1e-13 of a step
+    np.testing.assert_allclose(flows, work, rtol=1e-9, atol=1e-16)
+    np.testing.assert_allclose(seen[:, 0], parts(look)[0][:2], rtol=1e-9)
+    steady = MOVE(motors, 0, _held(12.0, 0.0), rotor, link, step, SERIES(), flows, seen)
+    assert abs(steady.speed - end.speed) > 1e-2
+
+
+@pytest.mark.parametrize("change", [np.inf, 0.4e-3])
+@pytest.mark.parametrize("damping", [10.0, 100.0])  # one series a part, and several
+def test_stages_have_the_mean_and_the_first_moment_of_the_motion(change, damping):
+    """Simpson's sums of angle and speed are integrals along the motion, kinks included."""
+    motors, (rotor, link), step = motors_of(parameters(D=damping)), STARTS, 1e-3
+    held = _held(12.0, -300.0, change=change)
+    middle, last = PREDICT(motors, 0, held, rotor, link, step, SERIES())
+
+    def moved(s):
+        until = _held(12.0, -300.0, change=change if change < s else np.inf)
+        room = np.zeros((9, 1)), np.zeros((2, 1))
+        return MOVE(motors, 0, until, rotor, link, s, SERIES(), *room) if s else rotor
+
+    for name, size in (("angle", 1.0), ("speed", 100.0)):
+        first, f_half, f_one = (getattr(at, name) for at in (rotor, middle, last))
+
+        def value(s, name=name):
+            return getattr(moved(s), name)
+
+        options = {"points": [0.4e-3], "epsabs": 1e-14, "epsrel": 1e-13}
+        mean = quad(value, 0, step, **options)[0]
+        moment = quad(lambda s, f=value: (step - s) * f(s), 0, step, **options)[0]
+        assert step * (first + 4 * f_half + f_one) / 6 == pytest.approx(mean, abs=1e-13 * size)
+        assert step**2 * (first + 2 * f_half) / 6 == pytest.approx(moment, abs=1e-16 * size)
+        away = abs(f_half - value(0.5 * step)) / size  # the value is no substitute where it bends
+        if damping == 10.0:
+            assert (away < 1e-5) == (change == np.inf)

@@ -206,3 +206,19 @@ def test_lower_levels_do_not_disturb_higher_ones():
     J = np.vstack([row.take(at) for row in BAXTER.law.rows(robot)])[top]
     acceleration = J @ np.linalg.solve(robot.mass_matrix(q), torque)
     assert np.abs(acceleration).max() < 1e-6 * np.abs(torque).max()
+
+
+def test_the_starred_inertia_is_that_of_what_the_motors_move():
+    """Λ* = (J* φ* J*ᵀ)⁺ in single support, where the motors do not reach all of the task."""
+    left = HUME.contacts[:1]
+    spaces = spaces_of(HUME, contacts=left, task_inertia="lambda_star", stiffness_form="published")
+    plain = spaces_of(HUME, contacts=left, stiffness_form="published")
+    robot, q = HUME.robot, HUME.posture
+    Mi, J_s = np.linalg.inv(robot.mass_matrix(q)), robot.contact_jacobian(left, q)
+    P = Mi - Mi @ J_s.T @ np.linalg.pinv(J_s @ Mi @ J_s.T) @ J_s @ Mi
+    phi, J_star = P[robot.nv_base :, robot.nv_base :], spaces.J_star[0, : spaces.levels[1]]
+    starred = np.linalg.pinv(J_star @ phi @ J_star.T, rcond=1e-9)
+    K = spaces.K_x[: len(J_star), : len(J_star)]
+    found = [one.stiffness[0, : len(J_star), : len(J_star)] for one in (spaces, plain)]
+    np.testing.assert_allclose(found[0], starred @ K, atol=1e-6 * np.abs(found[0]).max())
+    assert np.abs(found[1] - found[0]).max() > 1e-3 * np.abs(found[0]).max()

@@ -126,9 +126,17 @@ def margin_project(
     if as_json:
         show_json(answer)
         return
-    show(f"{'local margin':26} {time_text(found.delay_s)}")
+    covers = "any passive robot and environment, every delay below it"
+    passive = f"{time_text(found.passive_s):12} {covers}"
+    if found.not_passive:
+        passive = f"none: {found.not_passive}"
+    show(f"{'passive bound':26} {passive}")
+    show(f"{'jitter margin':26} {time_text(found.jitter_s):12} this robot, every delay below it")
+    show(f"{'local margin':26} {time_text(found.delay_s):12} this robot, a constant delay: exact")
+    for name, value in found.channels_s.items():
+        show(f"{f'  only {name} late':26} {time_text(value)}")
+    show(f"{'delay of the design':26} {time_text(system.delays.d_1)}")
     show(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
-    show(f"{'jitter margin':26} {time_text(found.jitter_s)}")
     if found.frequency_rad_s is not None:
         show(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
     show(f"{'unstable roots':26} {found.unstable_modes} without delay")

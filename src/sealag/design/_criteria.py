@@ -189,6 +189,15 @@ class Conditions:
         signal = system.law.signal.refusal(self.contraction)
         if signal is not None:
             yield signal.instants, signal.reason
+        if system.law.damped:
+            yield (
+                np.ones(count, dtype=bool),
+                (
+                    f"the controller computes the damping of task {system.law.damped} from rates "
+                    "that come late: no passivity bound covers it; rely on the jitter margin, or "
+                    "give the damping to the drives (motor_damping)"
+                ),
+            )
         for words in _drive_refusals(system):
             yield np.ones(count, dtype=bool), words
         for i, joint in enumerate(joints):

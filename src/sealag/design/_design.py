@@ -21,6 +21,8 @@ from sealag.whole_body import (
     Law,
     Rest,
     Spaces,
+    TickController,
+    freeze,
 )
 
 
@@ -49,6 +51,8 @@ class Design:
         robot: the robot.
         actuators: its series elastic actuators.
         law: the whole-body control law.
+        program: makes the controller that runs instead of the law, which is without effect then;
+            None for the law.
         posture: (nq,) configuration that the law holds, and that is certified without a motion.
         delays: both connections' delays, with the period of a controller that runs: the hold of
             one that states none counts too.
@@ -68,6 +72,7 @@ class Design:
     contacts: tuple[Contact, ...] = ()
     name: str = "system"
     criterion: Criterion = Criterion.CERTIFIED
+    program: Callable[["Design"], TickController] | None = None
     simulation: SimulationSection = field(default_factory=SimulationSection)
     walking: Walking | None = None
     source: Source | None = None
@@ -102,6 +107,7 @@ class Design:
         for contact in self.contacts:
             self.robot.check_frame(contact.frame)
         self.law.gain(self.robot)
+        self.law.drag(self.robot)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -168,6 +174,7 @@ class Design:
         Raises:
             RobotError: a mass matrix is not positive definite.
         """
+        self.require_law("The law's matrices are")
         return Spaces.along(self.robot, self.law, self.actuators, motion or self.still())
 
     def rest(self, motion: Motion | None = None, instant: int = 0) -> Rest:
@@ -177,6 +184,8 @@ class Design:
             motion: its instants; the posture if None.
             instant: which one.
         """
+        if self.program is not None:
+            return self._frozen_program().rest
         q, contacts = self._held(motion, instant)
         return Rest.of(self.robot, self.law, self.actuators, q, contacts=contacts)
 
@@ -210,6 +219,8 @@ class Design:
         Raises:
             ContractionError: q̄(θ) is fed back and does not exist.
         """
+        if self.program is not None:
+            return self._frozen_program().loop
         q, contacts = self._held(motion, instant)
         return FrozenLoop.of(
             self.robot,
@@ -221,6 +232,21 @@ class Design:
             embedded_delay=self.delays.torque_feedback_delay,
             beside=beside,
         )
+
+    def require_law(self, what: str) -> None:
+        """Refuse a question that a controller's program has no answer to.
+
+        Args:
+            what: what was asked for, the subject of the sentence.
+
+        Raises:
+            InputError: the controller is a program.
+        """
+        if self.program is not None:
+            raise InputError(
+                f"{what} those of a law, and the controller of {self.name} is a program, of which "
+                "only its ticks are known; `sealag margin` freezes it."
+            )
 
     @property
     def ideal_drives(self) -> bool:
@@ -241,13 +267,20 @@ class Design:
         posture: ArrayLike | None = None,
         *,
         reference: Callable[[float], tuple[Array, Array]] | None = None,
-    ) -> Controller:
-        """Return the controller that runs the law.
+    ) -> TickController:
+        """Return the controller that runs: the law's `Controller`, or what the program makes.
 
         Args:
             posture: (nq,) configuration that it holds; the system's if None.
             reference: offset (m,) of the references and its rate (m,) at a time.
+
+        Raises:
+            InputError: a program is asked for another posture or for a moving reference.
         """
+        if self.program is not None:
+            if reference is not None or posture is not None:
+                self.require_law("A posture of its own and a moving reference are")
+            return self.program(self)
         return Controller(
             self.robot,
             self.law,
@@ -262,3 +295,16 @@ class Design:
         if motion is None:
             return self.posture, self.contacts
         return motion.q[instant], motion.contact_sets[motion.contact_index[instant]]
+
+    def _frozen_program(self):
+        """The loop of the program's controller, differentiated as it ticks, and where it rests."""
+        assert self.program is not None
+        return freeze(
+            self.program(self),
+            self.robot,
+            self.actuators,
+            contacts=self.contacts,
+            q=self.posture,
+            period=self.delays.sample_time or 1e-3,
+            embedded_delay=self.delays.torque_feedback_delay,
+        )

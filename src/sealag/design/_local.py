@@ -297,7 +297,8 @@ class _Decision:
         """Instants (N,) of a motion that a potential decides: stable, with a margin above the
         bound."""
         system, found = self._system, np.zeros(len(self._motion), dtype=bool)
-        if len(found) == 1 or not (system.law.rests_at_posture and system.ideal_drives):
+        potential = system.law.rests_at_posture and not system.law.damped
+        if len(found) == 1 or not (potential and system.ideal_drives):
             return found
         for rows, spaces in self._along.parts():
             good = (self._bounds[rows] > 0.0) & (spaces.asymmetry <= ASYMMETRY_TOLERANCE)

@@ -12,7 +12,9 @@ from sealag.design._criteria import bounds_along
 from sealag.design._jitter import jitter_along
 from sealag.design._local import local_of
 from sealag.errors import ContractionError, InputError, SolverError
+from sealag.margin import DelayMargin
 from sealag.passivity import Basis, Criterion
+from sealag.whole_body import FrozenLoop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,8 +26,13 @@ class LocalMargins:
             was left open and none is unstable.
         first_crossing_s: smallest delay at which one more pair of roots crosses, s; None if not
             known.
+        passive_s: smallest passive bound over the instants, s: any passive robot and environment,
+            every delay that varies as it likes below it; 0 where no bound covers the design.
+        not_passive: why none does, in words; empty if one does.
         jitter_s: smallest jitter margin over the instants, s: stable for every delay that varies as
             it likes below it; 0 where the loop is unstable without delay, None if not known.
+        channels_s: exact margin at the critical instant if only the position signals, or only the
+            rates, of the command are late, s; empty if it feeds back no rates.
         frequency_rad_s: frequency of that pair, rad/s; None without one.
         mode: share of each joint's motor in that pair's motion.
         unstable_modes: roots with positive real part without delay, at that instant.
@@ -42,7 +49,10 @@ class LocalMargins:
 
     delay_s: float | None
     first_crossing_s: float | None
+    passive_s: float
+    not_passive: str
     jitter_s: float | None
+    channels_s: Mapping[str, float]
     frequency_rad_s: float | None
     mode: Mapping[str, float]
     unstable_modes: int
@@ -59,6 +69,7 @@ class LocalMargins:
         """Return everything as JSON says it: "unbounded" for a time that no delay reaches, None for
         what is not known."""
         plain = {key: stated(value) for key, value in asdict(self).items()}
+        plain["channels_s"] = {name: stated(value) for name, value in self.channels_s.items()}
         plain["intervals"] = [
             {"from_s": shortest, "to_s": stated(longest), "unstable_roots": count}
             for shortest, longest, count in self.intervals
@@ -85,7 +96,10 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
     if horizon is not None and not (math.isfinite(horizon) and horizon > 0.0):
         raise InputError(f"horizon is {horizon} s; a positive time is needed.")
     system, motion = along.system, along.motion
-    bounds = bounds_along(along, Criterion.CERTIFIED).bound.delay
+    if system.program is not None:
+        return _of_program(along, horizon)
+    bound = bounds_along(along, Criterion.CERTIFIED).bound
+    bounds = bound.delay
     local = local_of(along, bounds)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
@@ -94,15 +108,15 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         raise SolverError(local.problem)
     if horizon is not None:
         margin = loop.margin(horizon=horizon)
-    motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
-    size = np.abs(margin.mode[motors]) if len(margin.mode) else np.zeros(len(motors))
-    shares = size / max(float(size.sum()), 1e-300)
     return LocalMargins(
         delay_s=local.margin_s,
         first_crossing_s=local.first_crossing_s,
+        passive_s=float(bounds.min()),
+        not_passive="; ".join(bound.refusals),
         jitter_s=jitter_along(along, bounds, local),
+        channels_s=loop.channels() if system.law.damped else {},
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
-        mode=dict(zip(system.robot.joints, shares.tolist(), strict=True)),
+        mode=_shares(loop, margin, system.robot.joints),
         unstable_modes=margin.unstable_roots,
         neutral=margin.neutral,
         equilibrium="found" if rest is not None and rest.found else local.problem,
@@ -113,3 +127,43 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         bounded=local.count(Basis.BOUND),
         intervals=margin.intervals,
     )
+
+
+def _of_program(along: Along, horizon: float | None) -> LocalMargins:
+    """The margins of a controller that only its ticks are known of, in its posture."""
+    system = along.system
+    if len(along.motion) > 1:
+        raise InputError(
+            f"The controller of {system.name} is a program, which is frozen in the posture that it "
+            "holds: leave the motion out."
+        )
+    loop = system.frozen()
+    margin = loop.margin(horizon=horizon)
+    first = None if math.isnan(margin.first_crossing) else float(margin.first_crossing)
+    return LocalMargins(
+        delay_s=float(margin.delay),
+        first_crossing_s=first,
+        passive_s=0.0,
+        not_passive="the controller is a program, of which only its ticks are known",
+        jitter_s=0.0 if margin.unstable_roots else float(loop.jitter_margin().delay),
+        channels_s=loop.channels(),
+        frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
+        mode=_shares(loop, margin, system.robot.joints),
+        unstable_modes=margin.unstable_roots,
+        neutral=margin.neutral,
+        equilibrium="found",
+        instant=0,
+        time_s=float(along.motion.time[0]),
+        instants=1,
+        exact=1,
+        bounded=0,
+        intervals=margin.intervals,
+    )
+
+
+def _shares(loop: FrozenLoop, margin: DelayMargin, joints: tuple[str, ...]) -> dict[str, float]:
+    """Share of each joint's motor in the motion that crosses first."""
+    motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
+    size = np.abs(margin.mode[motors]) if len(margin.mode) else np.zeros(len(motors))
+    shares = size / max(float(size.sum()), 1e-300)
+    return dict(zip(joints, shares.tolist(), strict=True))

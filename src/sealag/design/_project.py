@@ -4,6 +4,7 @@ import math
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,15 @@ from sealag.delay import (
 )
 from sealag.design._design import Source
 from sealag.design._plain_words import first_problem
-from sealag.design._schema import AXES, Project, SamplesDelay
+from sealag.design._program import program_of
+from sealag.design._schema import (
+    AXES,
+    JointPdKeys,
+    ProgramKeys,
+    Project,
+    SamplesDelay,
+    WholeBodyKeys,
+)
 from sealag.design._system import System
 from sealag.design._walking import walking_of
 from sealag.errors import FileError, ProjectError, SealagError
@@ -30,7 +39,18 @@ from sealag.passivity import Criterion
 from sealag.robot import Contact, ContactKind, Robot, load_robot
 from sealag.typing import Array
 from sealag.units import number_of
-from sealag.whole_body import Law, Signal, Tank, TankFlow, Task, TaskKind
+from sealag.whole_body import (
+    GravityCompensation,
+    Law,
+    Signal,
+    StiffnessForm,
+    Tank,
+    TankFlow,
+    Task,
+    TaskError,
+    TaskInertia,
+    TaskKind,
+)
 
 LARGEST_PROJECT_BYTES = 1_000_000
 LARGEST_SAMPLES_BYTES = 50_000_000
@@ -114,7 +134,7 @@ def _named(path: Path, key: str) -> Iterator[None]:
         raise kind(f"{path}: {key}{': ' if key else ''}{error}") from error
 
 
-def _system(project: Any, path: Path, text: str) -> System:
+def _system(project: Project, path: Path, text: str) -> System:
     folder = path.parent
     with _named(path, "robot"):
         robot = load_robot(
@@ -123,31 +143,39 @@ def _system(project: Any, path: Path, text: str) -> System:
             actuated=project.robot.actuated,
             relative_to=folder,
         )
-    law = Law(
-        tasks=tuple(_task(section) for section in project.tasks),
-        signal=_fed_back(project.controller),
-        gravity=project.controller.gravity,
-        stiffness_form=project.controller.stiffness_form,
-        task_inertia=project.controller.task_inertia,
-        task_error=project.controller.task_error,
-    )
+    law = _law(project, robot, path)
     law.gain(robot)
+    law.drag(robot)
+    actuators = _actuators(project.actuators, robot, path)
+    if isinstance(project.controller, JointPdKeys) and project.controller.damping_at == "drive":
+        kd = _by_joint(project.controller.kd, robot, path, "controller.kd")
+        actuators = replace(actuators, motor_damping=actuators.motor_damping + kd)
+    program, program_file = None, None
+    if isinstance(project.controller, ProgramKeys):
+        program_file = folder / project.controller.file
+        with _named(path, "controller.file"):
+            program = program_of(program_file, project.controller.function)
     with _named(path, "simulation.pushes"):
         for push in project.simulation.pushes:
             robot.check_frame(push.frame)
-    motion_file = folder / project.motion.file if project.motion else None
-    if motion_file and not motion_file.is_file():
-        raise FileError(f"{path}: motion.file is {project.motion.file!r}; there is no such file.")
+    motion_file = None
+    if project.motion:
+        motion_file = folder / project.motion.file
+        if not motion_file.is_file():
+            raise FileError(
+                f"{path}: motion.file is {project.motion.file!r}; there is no such file."
+            )
     samples = [keys.file for _, keys in project.delays if isinstance(keys, SamplesDelay)]
-    files = [path, robot.urdf_path, motion_file, *(folder / name for name in samples)]
+    files = [path, robot.urdf_path, motion_file, program_file, *(folder / name for name in samples)]
     return System(
         name=path.stem,
         robot=robot,
-        actuators=_actuators(project.actuators, robot, path),
+        actuators=actuators,
         law=law,
+        program=program,
         contacts=_contacts(project.contacts, robot, path),
         posture=_posture(project.posture, robot, path),
-        criterion=Criterion(project.controller.criterion),
+        criterion=_criterion(project.controller),
         delays=_delays(project.delays, folder, path),
         simulation=project.simulation,
         walking=walking_of(project.walking, robot),
@@ -158,6 +186,63 @@ def _system(project: Any, path: Path, text: str) -> System:
             motion_file=motion_file,
         ),
     )
+
+
+def _law(project: Project, robot: Robot, path: Path) -> Law:
+    """The law of [controller], with the [[tasks]] of a whole-body one."""
+    keys = project.controller
+    if not isinstance(keys, WholeBodyKeys) and project.tasks:
+        raise ProjectError(
+            f'{path}: [[tasks]] are given, but controller.kind is "{keys.kind}", which has none; '
+            'remove them, or let the kind be "wbosc".'
+        )
+    if isinstance(keys, ProgramKeys):
+        nothing = Task(name="none", kind=TaskKind.POSTURE, stiffness=np.zeros(robot.n))
+        return Law(tasks=(nothing,), gravity=GravityCompensation.NONE)
+    if isinstance(keys, JointPdKeys):
+        late = keys.damping_at == "controller"
+        joints = Task(
+            name="joints",
+            kind=TaskKind.POSTURE,
+            stiffness=_by_joint(keys.kp, robot, path, "controller.kp"),
+            damping=_by_joint(keys.kd, robot, path, "controller.kd") if late else 0.0,
+        )
+        return Law(
+            tasks=(joints,),
+            signal=Signal.named(keys.feedback),
+            gravity=GravityCompensation(keys.gravity),
+            stiffness_form=StiffnessForm.FORCE,
+        )
+    if not project.tasks:
+        raise ProjectError(f"{path}: the key tasks is missing: [[tasks]] say what is controlled.")
+    return Law(
+        tasks=tuple(_task(section) for section in project.tasks),
+        signal=_fed_back(keys),
+        gravity=GravityCompensation(keys.gravity),
+        stiffness_form=StiffnessForm(keys.stiffness_form),
+        task_inertia=TaskInertia(keys.task_inertia),
+        task_error=TaskError(keys.task_error),
+    )
+
+
+def _by_joint(given: float | dict[str, float], robot: Robot, path: Path, key: str) -> Array:
+    """One number for all joints, or a table with one for each (n,)."""
+    if not isinstance(given, dict):
+        return np.full(robot.n, float(given))
+    with _named(path, key):
+        for name in given:
+            robot.joint_index(name)
+    missing = [name for name in robot.joints if name not in given]
+    if missing:
+        raise ProjectError(
+            f"{path}: {key} has no number for joint {missing[0]} ({len(missing)} in all); give "
+            "one for each joint, or one number for all."
+        )
+    return np.array([given[name] for name in robot.joints])
+
+
+def _criterion(keys: WholeBodyKeys | JointPdKeys | ProgramKeys) -> Criterion:
+    return Criterion(keys.criterion) if isinstance(keys, WholeBodyKeys) else Criterion.CERTIFIED
 
 
 def _fed_back(section: Any) -> Signal:
@@ -221,6 +306,7 @@ def _task(section: Any) -> Task:
         joints=tuple(section.joints),
         axes=axes,
         priority=section.priority,
+        damping=np.asarray(section.damping, dtype=float),
     )
 
 

@@ -12,6 +12,7 @@ from sealag.design._local import local_of
 from sealag.design._margins import stated
 from sealag.errors import ContractionError, InputError
 from sealag.passivity import Criterion
+from sealag.whole_body import FrozenLoop
 
 RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0)
 """Hz, of a sweep if nothing else is asked for."""
@@ -48,6 +49,17 @@ class Rate:
         }
 
 
+def _loops(system: Design) -> list[FrozenLoop]:
+    """In the posture and, where the law sags, where it rests."""
+    if system.program is not None:
+        return [system.frozen()]
+    along = Along.of(system)
+    local = local_of(along, bounds_along(along, Criterion.CERTIFIED).bound.delay)
+    if local.loop is None:
+        raise ContractionError(local.problem)
+    return list(loops_at(along, 0, local))
+
+
 def rate_sweep(system: Design, rates: Sequence[float]) -> tuple[Rate, ...]:
     """Return what `System.rate_sweep` does.
 
@@ -55,11 +67,7 @@ def rate_sweep(system: Design, rates: Sequence[float]) -> tuple[Rate, ...]:
         system: the design.
         rates: Hz.
     """
-    along = Along.of(system)
-    local = local_of(along, bounds_along(along, Criterion.CERTIFIED).bound.delay)
-    if local.loop is None:
-        raise ContractionError(local.problem)
-    loops = list(loops_at(along, 0, local))
+    loops = _loops(system)
     if any(loop.A_e.any() and loop.embedded_delay for loop in loops):
         raise InputError(
             "A rate sweep takes one delay, and torque feedback is late too: leave out "

@@ -23,6 +23,8 @@ from sealag.passivity import Criterion
 from sealag.robot import ContactKind
 from sealag.whole_body import (
     GravityCompensation,
+    LinkAngles,
+    MotorAngles,
     Signal,
     StiffnessForm,
     TankFlow,
@@ -68,6 +70,8 @@ Gain = Annotated[
     FiniteFloat,
     _within(1e-6, 1e9, "1/s², or N/m or Nm/rad if stiffness_form is force", or_zero=True),
 ]
+JointStiffness = Annotated[FiniteFloat, _within(0, 1e8, "Nm/rad")]
+TaskDamping = Annotated[FiniteFloat, _within(0, 1e6, "N s/m or Nm s/rad")]
 Duration = Annotated[FiniteFloat, _within(1e-6, 1e6, "s")]
 Instant = Annotated[FiniteFloat, _within(-1e12, 1e12, "s")]
 Seed = Annotated[int, Field(ge=0)]
@@ -146,9 +150,10 @@ class ContactSection(Section):
     kind: Annotated[str, _one_of(ContactKind)] = ContactKind.POINT.value
 
 
-class ControllerSection(Section):
-    """[controller]"""
+class WholeBodyKeys(Section):
+    """[controller] of kind "wbosc": the paper's whole-body law of [[tasks]]"""
 
+    kind: Literal["wbosc"] = "wbosc"
     feedback: Annotated[str, _one_of(Signal.names())]
     gravity: Annotated[str, _one_of(GravityCompensation)]
     stiffness_form: Annotated[str, _one_of(StiffnessForm)] = StiffnessForm.SYMMETRIC.value
@@ -158,6 +163,38 @@ class ControllerSection(Section):
     tank_flow: Annotated[str, _one_of(TankFlow)] = TankFlow.CORRECTED.value
     tank_energy_j: Annotated[FiniteFloat, _within(0, 1e9, "J")] = 1.0
     tank_rate: Annotated[FiniteFloat, _within(0, 1e6, "1/s")] = 5.0
+
+
+class JointPdKeys(Section):
+    """[controller] of kind "joint_pd": τ = K_p (q_d − q) − K_d q̇ + ḡ, joint by joint"""
+
+    kind: Literal["joint_pd"]
+    feedback: Annotated[str, _one_of((MotorAngles.name, LinkAngles.name))] = MotorAngles.name
+    gravity: Annotated[str, _one_of(GravityCompensation)]
+    kp: JointStiffness | dict[str, JointStiffness]
+    kd: Damping | dict[str, Damping] = 0.0
+    damping_at: Literal["controller", "drive"] = "controller"
+
+
+class ProgramKeys(Section):
+    """[controller] of kind "python": a function of the user's own makes what ticks"""
+
+    kind: Literal["python"]
+    file: str
+    function: str = "controller"
+
+
+def _kind_of(value: Any) -> str:
+    """The kind of a [controller] table: the paper's law if none is named."""
+    return str(value.get("kind", "wbosc")) if isinstance(value, dict) else "wbosc"
+
+
+ControllerKeys = Annotated[
+    Annotated[WholeBodyKeys, Tag("wbosc")]
+    | Annotated[JointPdKeys, Tag("joint_pd")]
+    | Annotated[ProgramKeys, Tag("python")],
+    Discriminator(_kind_of),
+]
 
 
 class TaskSection(Section):
@@ -173,6 +210,10 @@ class TaskSection(Section):
     joints: list[str] = []
     axes: list[Annotated[str, _one_of(AXES)]] = []
     priority: Annotated[int, Field(ge=1)] = 1
+    damping: Annotated[
+        Annotated[TaskDamping, Tag("number")] | Annotated[list[TaskDamping], Tag("list")],
+        Discriminator(_by_shape),
+    ] = 0.0
 
 
 class DelayTable(Section):
@@ -326,8 +367,8 @@ class Project(Section):
     posture: PostureSection = PostureSection()
     actuators: ActuatorsSection
     contacts: list[ContactSection] = []
-    controller: ControllerSection
-    tasks: Annotated[list[TaskSection], Field(min_length=1)]
+    controller: ControllerKeys
+    tasks: list[TaskSection] = []
     delays: DelaysSection
     motion: MotionSection | None = None
     simulation: SimulationSection = SimulationSection()

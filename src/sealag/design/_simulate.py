@@ -15,7 +15,7 @@ from sealag.simulation import Clock, Foot, Network, Push, Run, Scene, closed_loo
 from sealag.typing import Array
 from sealag.units import seconds_from_ms
 from sealag.walking import GroundProfile, Walking
-from sealag.whole_body import Controller, TaskKind, TickController
+from sealag.whole_body import TaskKind, TickController
 
 LONGEST_STEP = 1e-3
 """Longest physics step, s."""
@@ -163,14 +163,14 @@ def _walk(system: Design, walking: Walking, pushes: Sequence[Push], common: dict
 class _Tracking:
     """A controller whose reference moves: its potential alone says nothing about passivity."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: TickController) -> None:
         self.reset, self.tick = controller.reset, controller.tick
 
 
 def _controller(system: Design, kind: str, q: Array) -> TickController:
     """The design's controller, holding where it stands or tracking about it."""
     if kind != "track":
-        return system.controller(q)
+        return system.controller(None if system.program is not None else q)
     m = system.law.levels(system.robot)[-1]
     w = 2.0 * math.pi * system.simulation.track_frequency_hz
     size, row = system.simulation.track_amplitude, np.eye(m)[0]

@@ -32,6 +32,10 @@ motor_damping = "FILL: D_theta, Nms/rad (Ns/m where the joint slides), embedded 
 # spring_stiffness = 350.0
 {contacts}
 [controller]
+# kind = "wbosc"               # the law of the tasks below; or joint_pd, which has no tasks but
+# kp (Nm/rad) and kd (Nms/rad), a number for all joints or a table with one of each, gravity,
+# feedback (motor or joint) and damping_at ("controller", where kd is late, or "drive"); or python,
+# with the file of a function (function) that makes what ticks from a System, and nothing else.
 feedback = "motor"             # motor | static_joint | static_joint_tank | joint
 gravity = "planned"            # feedback | planned | none
 stiffness_form = "symmetric"   # symmetric | published | force (without the task inertia)
@@ -47,6 +51,7 @@ name = "posture"
 kind = "posture"               # com | position | orientation | pose | posture
 stiffness = "FILL: 1/s^2, times the task inertia; N/m or Nm/rad if stiffness_form is force"
 priority = 1
+# damping = 0.0                # N s/m or Nm s/rad, that the controller computes, late like the rest
 
 # Delays are constant, sinusoid (mean_ms, amplitude_ms, angular_frequency_rad_s), table (time_s,
 # delay_ms) or samples (file of measured ones in ms, period_s), each with jitter_ms, packet_loss,

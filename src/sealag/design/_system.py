@@ -37,6 +37,8 @@ class System(Design):
         robot: the robot.
         actuators: its series elastic actuators.
         law: the whole-body control law.
+        program: makes the controller that runs instead of the law, which is without effect then;
+            None for the law.
         posture: (nq,) configuration that the law holds, and that is certified without a motion.
         delays: both connections' delays, with the period of a controller that runs: the hold of
             one that states none counts too.
@@ -174,6 +176,7 @@ class System(Design):
         Raises:
             InputError: as `certify` raises it.
         """
+        self.require_law("A certificate's bounds are")
         if not isinstance(motion, Motion | None):
             raise InputError(f"motion is {motion!r}; System.load_motion makes a Motion of a file.")
         if motion is not None and len(motion) > MOST_INSTANTS:

@@ -9,6 +9,10 @@ from sealag.kernels._jit import inner, shared, summing
 _ROUNDING = 1e-13
 """Of the trace: what a Cholesky factorisation leaves. Ten times smaller takes rounding for rank;
 ten times larger drops directions that the rank tolerance of tasks, 1e-9, is to decide about."""
+_NOTHING = 1e-34
+"""Square of the share of two diagonal entries below which the one beside them is rounding. A
+hundred times larger shows in the last digit of eigenvalues; a hundred times smaller turns what is
+0."""
 _WORST_CONDITION = 1e4
 """Up to which A⁺ through G⁻² loses no more than six digits; ten times more loses eight."""
 
@@ -34,7 +38,7 @@ def trace(A):
     return total
 
 
-@inner
+@shared
 def multiply(A, B, out):
     """out = A B for C-contiguous A (m, k), B (k, n), out (m, n)."""
     m, k = A.shape
@@ -128,7 +132,8 @@ def invert_spd(A, out, factor):
 
 @inner
 def jacobi_eigh(A, values, vectors):
-    """Eigenvalues and eigenvectors (columns) of a symmetric A (n, n); A is overwritten.
+    """Eigenvalues and eigenvectors (columns) of a symmetric A (n, n), of which the upper part is
+    read and overwritten.
 
     Cyclic Jacobi rotations. Convergence is quadratic: once the off-diagonal part is below 1e-9 of
     the diagonal, one more sweep takes it below rounding.
@@ -142,7 +147,7 @@ def jacobi_eigh(A, values, vectors):
         for i in range(n):
             scale += A[i, i] * A[i, i]
             for j in range(i):
-                off += A[i, j] * A[i, j]
+                off += A[j, i] * A[j, i]
         for p in range(n - 1):
             for q in range(p + 1, n):
                 _rotate(A, vectors, p, q)
@@ -154,21 +159,26 @@ def jacobi_eigh(A, values, vectors):
 
 @inner
 def _rotate(A, vectors, p, q):
-    if A[p, q] == 0.0:
+    """Rotate A[p, q] away, p < q, in the upper part of A; not if it is rounding."""
+    a = A[p, q]
+    if a * a <= _NOTHING * abs(A[p, p] * A[q, q]):
         return
     n = A.shape[0]
-    ratio = (A[q, q] - A[p, p]) / (2.0 * A[p, q])
+    ratio = (A[q, q] - A[p, p]) / (2.0 * a)
     t = 1.0 / (abs(ratio) + np.sqrt(ratio * ratio + 1.0))
     if ratio < 0.0:
         t = -t
     c = 1.0 / np.sqrt(t * t + 1.0)
     s = t * c
-    for k in range(n):
-        a, b = A[k, p], A[k, q]
-        A[k, p], A[k, q] = c * a - s * b, s * a + c * b
-    for k in range(n):
-        a, b = A[p, k], A[q, k]
-        A[p, k], A[q, k] = c * a - s * b, s * a + c * b
+    for k in range(p):
+        A[k, p], A[k, q] = c * A[k, p] - s * A[k, q], s * A[k, p] + c * A[k, q]
+    for k in range(p + 1, q):
+        A[p, k], A[k, q] = c * A[p, k] - s * A[k, q], s * A[p, k] + c * A[k, q]
+    for k in range(q + 1, n):
+        A[p, k], A[q, k] = c * A[p, k] - s * A[q, k], s * A[p, k] + c * A[q, k]
+    A[p, p] -= t * a
+    A[q, q] += t * a
+    A[p, q] = 0.0
     for k in range(n):
         a, b = vectors[k, p], vectors[k, q]
         vectors[k, p], vectors[k, q] = c * a - s * b, s * a + c * b

@@ -13,17 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.kernels._jit import entry, inner, shared
-from sealag.kernels.ledger import (
-    COMMAND,
-    COULOMB,
-    DAMPING,
-    JOINT_DAMPING,
-    MOTOR_WORK,
-    PORT,
-    SHAFT,
-    SPRING_DAMPING,
-    VISCOUS,
-)
 from sealag.typing import Array
 
 _REACH = 1.5
@@ -33,8 +22,6 @@ _FORCED = 3  # terms that a cubic link motion appends
 _TERMS = 28  # more than `_order` asks for at _REACH
 _PLACES, _WEIGHTS = (part.copy() for part in np.polynomial.legendre.leggauss(8))
 _PLACES, _WEIGHTS = 0.5 * (1.0 + _PLACES), 0.5 * _WEIGHTS
-_TURNS = 8  # changes of a rotor's direction in one step
-_STOPPED = 1e-13  # of a time, and rad/s: where a reversal is located
 
 
 class Motors(NamedTuple):
@@ -51,14 +38,6 @@ class Motors(NamedTuple):
     velocity_limit: Array  # (n,) rad/s
     bandwidth: Array  # (n,) of the drive's torque, rad/s; inf if ideal
     bearing: Array  # (n,) damping on the link's side, which no motor feels, Nms/rad
-
-
-class Held(NamedTuple):
-    """What the drives hold over a step."""
-
-    command: Array  # (n,) tau_osc, Nm
-    known_torque: Array  # (n,) spring torque of the torque feedback, Nm, if it is delayed
-    instant: bool  # whether torque feedback is not delayed
 
 
 class Rotor(NamedTuple):
@@ -233,7 +212,7 @@ def link_work(link, step):
 
 
 @inner
-def _expand(motors, j, instant, drive, rotor, link, t, order, series):
+def expand(motors, j, instant, drive, rotor, link, t, order, series):
     """Write the series of speed, spring and motor torque over a time t; return the rotor then."""
     angle = speed = torque = 0.0
     for k in range(order + 1):
@@ -250,15 +229,14 @@ def _expand(motors, j, instant, drive, rotor, link, t, order, series):
 
 
 @inner
-def _half(series, rotor, t, order):
-    """Return the rotor in the middle of a series over a time t that begins at a rotor."""
-    angle, speed, torque, share = rotor.angle, 0.0, 0.0, 1.0
+def areas(series, order, t):
+    """Return ∫δ and ∫(t − s) δ over a series' time t, δ the way since its beginning."""
+    once = twice = 0.0
     for k in range(order + 1):
-        speed += share * series.speed[k]
-        torque += share * series.torque[k]
-        share *= 0.5
-        angle += share * t * series.speed[k] / (k + 1.0)
-    return Rotor(angle, speed, torque)
+        part = series.speed[k] / ((k + 1.0) * (k + 2.0))
+        once += part
+        twice += part / (k + 3.0)
+    return t**2 * once, t**3 * twice
 
 
 @inner
@@ -284,6 +262,14 @@ def _integrate(series, order, link, t, works):
     return Works(squared, port, shaft, slip, motor)
 
 
+@inner
+def pieces_of(motors, j, instant, drive, span):
+    """Return into how many series a time is divided, their length, and their order."""
+    reach = fastest(motors, j, instant, drive.limited) * span
+    pieces = max(1, math.ceil(reach / _REACH))
+    return pieces, span / pieces, _order(reach / pieces)
+
+
 @shared
 def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     """Move rotor j along its link's cubic while its drive does one thing.
@@ -302,138 +288,11 @@ def travel(motors, j, instant, drive, rotor, link, span, series, booked):
     Returns:
         The rotor at the end, and its works.
     """
-    reach = fastest(motors, j, instant, drive.limited) * span
-    pieces = max(1, math.ceil(reach / _REACH))
-    t, order, works = span / pieces, _order(reach / pieces), Works(0.0, 0.0, 0.0, 0.0, 0.0)
+    pieces, t, order = pieces_of(motors, j, instant, drive, span)
+    works = Works(0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(pieces):
         here = link_at(link, k * t)
-        rotor = _expand(motors, j, instant, drive, rotor, here, t, order, series)
+        rotor = expand(motors, j, instant, drive, rotor, here, t, order, series)
         if booked:
             works = _integrate(series, order, here, t, works)
     return rotor, works
-
-
-@inner
-def choose(motors, j, held, rotor, link):
-    """Return what drive j does from now on, the direction of Coulomb friction (0 for none), and the
-    rotor with the torque that it then has."""
-    ratio, limit, coulomb = motors.ratio[j], motors.torque_limit[j], motors.coulomb[j]
-    spring = spring_torque(motors, j, rotor, link.angle, link.speed)
-    u = held.command[j]
-    if not held.instant:
-        u += (1.0 - ratio) / ratio * held.known_torque[j]
-    wanted = ratio * (u - motors.damping[j] * rotor.speed)
-    if held.instant:
-        wanted += (1.0 - ratio) * spring
-    upper = limit if rotor.speed < motors.velocity_limit[j] else 0.0
-    lower = -limit if rotor.speed > -motors.velocity_limit[j] else 0.0
-    limited = wanted > upper or wanted < lower
-    if limited:
-        u = wanted = min(max(wanted, lower), upper)
-    torque = wanted if motors.bandwidth[j] == np.inf else rotor.torque
-    locked, direction = False, 0.0
-    if coulomb > 0.0:
-        net = torque - spring
-        locked = rotor.speed == 0.0 and abs(net) <= coulomb
-        if not locked:
-            direction = math.copysign(1.0, rotor.speed if rotor.speed != 0.0 else net)
-    drive = Drive(limited, locked, u, -direction * coulomb)
-    return drive, direction, Rotor(rotor.angle, rotor.speed, torque)
-
-
-@inner
-def _reversal(motors, j, instant, drive, rotor, link, time, series):
-    """Return the instant in (0, time) at which the speed passes through zero (Illinois)."""
-    direction = math.copysign(1.0, rotor.speed)
-    low, high, f_low = 0.0, time, direction * rotor.speed
-    after, _ = travel(motors, j, instant, drive, rotor, link, time, series, False)
-    f_high = direction * after.speed
-    for _ in range(30):
-        middle = (low * f_high - high * f_low) / (f_high - f_low)
-        after, _ = travel(motors, j, instant, drive, rotor, link, middle, series, False)
-        f = direction * after.speed
-        if abs(f) < _STOPPED or high - low < _STOPPED * time:
-            return middle
-        if f < 0.0:
-            high, f_high = middle, f
-            f_low *= 0.5
-        else:
-            low, f_low = middle, f
-            f_high *= 0.5
-    return 0.5 * (low + high)
-
-
-@inner
-def predict(motors, j, held, rotor, link, step, series):
-    """Return rotor j half a step and a step ahead along its link's motion."""
-    drive, _, rotor = choose(motors, j, held, rotor, link)
-    reach = fastest(motors, j, held.instant, drive.limited) * step
-    if reach <= _REACH:
-        order = _order(reach)
-        whole = _expand(motors, j, held.instant, drive, rotor, link, step, order, series)
-        return _half(series, rotor, step, order), whole
-    half, _ = travel(motors, j, held.instant, drive, rotor, link, 0.5 * step, series, False)
-    link = link_at(link, 0.5 * step)
-    whole, _ = travel(motors, j, held.instant, drive, half, link, 0.5 * step, series, False)
-    return half, whole
-
-
-@inner
-def move(motors, j, held, rotor, link, step, series, flows):
-    """Move rotor j over a step along its link's cubic, and write its works.
-
-    Friction that reverses ends a piece of the step; limits act from a piece's beginning.
-
-    Args:
-        motors: all joints.
-        j: the joint.
-        held: what the drives hold.
-        rotor: at the beginning.
-        link: its cubic.
-        step: s.
-        series: scratch.
-        flows: (9, n) as in ``ledger.JOINT_FLOWS``, J; column j is written.
-
-    Returns:
-        The rotor at the end.
-    """
-    flows[:, j] = 0.0
-    flows[JOINT_DAMPING, j] = motors.bearing[j] * link_work(link, step)
-    left, here = step, link
-    for _ in range(_TURNS):
-        drive, direction, rotor = choose(motors, j, held, rotor, here)
-        after, works = travel(
-            motors, j, held.instant, drive, rotor, here, left, series, True
-        )  # fmt: skip
-        span, reversing = left, direction != 0.0 and after.speed * direction < 0.0
-        if reversing and rotor.speed == 0.0:  # friction would push it back: it stays
-            drive, reversing = Drive(drive.limited, True, drive.held, 0.0), False
-            after, works = travel(
-                motors, j, held.instant, drive, rotor, here, left, series, True
-            )  # fmt: skip
-        elif reversing:
-            span = _reversal(motors, j, held.instant, drive, rotor, here, left, series)
-            after, works = travel(
-                motors, j, held.instant, drive, rotor, here, span, series, True
-            )  # fmt: skip
-        _book(motors, j, works, after.angle - rotor.angle, held.command[j], flows)
-        rotor = Rotor(after.angle, 0.0 if reversing else after.speed, after.torque)
-        here = link_at(here, span)
-        left -= span
-        if not reversing or left <= 1e-12 * step:
-            break
-    _, _, rotor = choose(motors, j, held, rotor, here)
-    return rotor
-
-
-@inner
-def _book(motors, j, works, way, command, flows):
-    """Add the works of a piece of rotor j's motion, each with its own coefficient."""
-    flows[PORT, j] += works.port
-    flows[SHAFT, j] += works.shaft
-    flows[MOTOR_WORK, j] += works.motor
-    flows[COMMAND, j] += command * way
-    flows[DAMPING, j] += motors.damping[j] * works.speed_squared
-    flows[VISCOUS, j] += motors.viscous[j] * works.speed_squared
-    flows[COULOMB, j] += motors.coulomb[j] * abs(way)
-    flows[SPRING_DAMPING, j] += motors.spring_damping[j] * works.slip_squared

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.kernels import motor, spatial
+from sealag.kernels import motor, motor_step, spatial
 from sealag.kernels._jit import entry, inner
 from sealag.kernels.contact import (
     Instant,
@@ -33,7 +33,8 @@ from sealag.kernels.ledger import (
     Ledger,
 )
 from sealag.kernels.linalg import copy
-from sealag.kernels.motor import Held, Rotor, Series
+from sealag.kernels.motor import Rotor, Series
+from sealag.kernels.motor_step import Held
 from sealag.typing import Array
 
 MARGIN = 1e-9
@@ -51,10 +52,11 @@ class Memory(NamedTuple):
     accelerations: Array  # (4, nv)
     powers: Array  # (4, 4)
     displacement: Array  # (nv,)
-    angle: Array  # (2, n) motor angles half a step and a step ahead
+    angle: Array  # (2, n) motor angles at the stages in the middle and at the end
     speed: Array  # (2, n)
     gained: Ledger  # works of the step; its stores are scratch
     series: Series
+    seen: Array  # (2, n) motor angles and speeds where sensors look
     yielding: Array  # (P,) at the step's beginning
 
 
@@ -65,6 +67,7 @@ class Physics(NamedTuple):
     work: Work
     now: Instant
     following: Instant  # the end of a step that is tried
+    between: Instant  # what is measured inside it; only what sensors measure is written
     held: Held  # what the drives hold now
     ledger: Ledger
     memory: Memory
@@ -97,24 +100,28 @@ def allocate_physics(plant: Plant, *, instant: bool) -> Physics:
     """
     work, n, points = allocate_work(plant), len(plant.motors.stiffness), len(plant.contacts.closed)
     nv, total = len(work.terms.nle), len(plant.contacts.frame)
-    now, following = (
-        allocate_instant(nv + plant.tree.extra, nv, n, points=points, total=total) for _ in range(2)
+    now, following, between = (
+        allocate_instant(nv + plant.tree.extra, nv, n, points=points, total=total) for _ in range(3)
     )
     memory = Memory(
         rates=np.zeros((4, nv)), accelerations=np.zeros((4, nv)), powers=np.zeros((4, 4)),
         displacement=np.zeros(nv), angle=np.zeros((2, n)), speed=np.zeros((2, n)),
-        gained=allocate_ledger(n), series=motor.allocate_series(), yielding=np.zeros(points),
+        gained=allocate_ledger(n), series=motor.allocate_series(),
+        seen=np.zeros((2, n)), yielding=np.zeros(points),
     )  # fmt: skip
     return Physics(
-        plant=plant, work=work, now=now, following=following,
-        held=Held(command=np.zeros(n), known_torque=np.zeros(n), instant=instant),
+        plant=plant, work=work, now=now, following=following, between=between,
+        held=Held(
+            command=np.zeros(n), later=np.zeros(n), change=np.full(1, np.inf),
+            look=np.full(1, np.inf), known_torque=np.zeros(n), instant=instant,
+        ),
         ledger=allocate_ledger(n), memory=memory,
     )  # fmt: skip
 
 
 @inner
 def _predict_motors(plant, now, held, step, memory):
-    """Write motor angles and speeds half a step and a step ahead, the links accelerating evenly."""
+    """Write motor angles and speeds at the stages of a step, the links accelerating evenly."""
     n, motors = now.theta.size, plant.motors
     first_q, first_v = now.q.size - n, now.v.size - n
     for j in range(n):
@@ -122,7 +129,7 @@ def _predict_motors(plant, now, held, step, memory):
             now.q[first_q + j], now.v[first_v + j], now.acceleration[first_v + j], 0.0
         )
         rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
-        half, whole = motor.predict(motors, j, held, rotor, link, step, memory.series)
+        half, whole = motor_step.predict(motors, j, held, rotor, link, step, memory.series)
         memory.angle[0, j], memory.speed[0, j] = half.angle, half.speed
         memory.angle[1, j], memory.speed[1, j] = whole.angle, whole.speed
 
@@ -140,11 +147,47 @@ def _close(plant, now, held, step, memory, following):
         q, v = first_q + j, first_v + j
         link = motor.link_through(now.q[q], now.v[v], following.q[q], following.v[v], step)
         rotor = Rotor(now.theta[j], now.theta_dot[j], now.tau_motor[j])
-        rotor = motor.move(
-            plant.motors, j, held, rotor, link, step, memory.series, memory.gained.joint
+        rotor = motor_step.move(
+            plant.motors,
+            j,
+            held,
+            rotor,
+            link,
+            step,
+            memory.series,
+            memory.gained.joint,
+            memory.seen,
         )
         following.theta[j], following.theta_dot[j] = rotor.angle, rotor.speed
         following.tau_motor[j] = rotor.torque
+
+
+@inner
+def interpolate(physics, step):
+    """Write state and spring torques at the look inside the step that was tried.
+
+    Links move along the cubic through angles and speeds at both ends, as motors are moved; their
+    speeds are the cubic through speeds and accelerations.
+    """
+    now, following, memory, t = (
+        physics.now, physics.following, physics.memory, physics.held.look[0],
+    )  # fmt: skip
+    at, n, nv = physics.between, now.theta.size, now.v.size
+    base, rate, u = nv - n, memory.rates[1], memory.rates[2]
+    spatial.tangent_rate(memory.displacement, following.v, base, rate)
+    x = t / step
+    ahead, early, late = x * x * (3.0 - 2.0 * x), t * (1.0 - x) ** 2, t * x * (x - 1.0)
+    for i in range(nv):
+        turn = following.v[i] - now.v[i]
+        bend = early * now.acceleration[i] + late * following.acceleration[i]
+        at.v[i] = now.v[i] + ahead * turn + bend
+        u[i] = ahead * memory.displacement[i] + early * now.v[i] + late * rate[i]
+    spatial.integrate(now.q, u, base, at.q)
+    for j in range(n):
+        q, v = now.q.size - n + j, base + j
+        rotor = Rotor(memory.seen[0, j], memory.seen[1, j], 0.0)
+        at.theta[j], at.theta_dot[j] = rotor.angle, rotor.speed
+        at.tau_sea[j] = motor.spring_torque(physics.plant.motors, j, rotor, at.q[q], at.v[v])
 
 
 @inner

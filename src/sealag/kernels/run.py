@@ -22,7 +22,17 @@ from sealag.kernels.dynamics import KINETIC
 from sealag.kernels.friction import SETTLED, UNSOLVABLE
 from sealag.kernels.ledger import JOINT_FLOWS, SCALAR_FLOWS, STORES
 from sealag.kernels.linalg import copy
-from sealag.kernels.plant import GLIDE, MARGIN, SAME, STEP, STORE, accept, act, take_step
+from sealag.kernels.plant import (
+    GLIDE,
+    MARGIN,
+    SAME,
+    STEP,
+    STORE,
+    accept,
+    act,
+    interpolate,
+    take_step,
+)
 from sealag.typing import Array, IntArray
 
 LOAD, SAMPLE, TICK, TAKE = range(4)  # kinds of events, in their order at one instant
@@ -168,6 +178,47 @@ def _happen(physics, channels, event):
 
 
 @inner
+def _passed(held, channels, event, begin, end):
+    """Return the event that ends a step, and prepare drives and sensors for those before: a step
+    passes one sample and one taking."""
+    while event < channels.due.size and channels.due[event] < end:
+        kind, after = channels.kind[event], channels.due[event] - begin
+        if kind == TAKE and held.change[0] == np.inf:
+            held.change[0] = after
+            tick = channels.tick[event]
+            copy(channels.commands[tick % channels.commands.shape[0]], held.later)
+        elif kind == SAMPLE and held.look[0] == np.inf:
+            held.look[0] = after
+        else:
+            break
+        event += 1
+    return event
+
+
+@inner
+def _pass(physics, channels, event, last, step):
+    """Let the events happen that a step has passed, from one on to a last one."""
+    for k in range(event, last):
+        if channels.kind[k] == SAMPLE:
+            interpolate(physics, step)
+            row = channels.samples[channels.tick[k] % channels.samples.shape[0]]
+            write_measurement(physics.between, physics.plant.contacts, channels.due[k], row)
+        else:
+            copy(physics.held.later, physics.held.command)
+            channels.acting_tick[0] = channels.tick[k]
+
+
+@inner
+def _keeps_sliding(physics):
+    """Whether no point begins or ends to slide in the step that was tried."""
+    before, now = physics.memory.yielding, physics.plant.contacts.yielding
+    same = True
+    for i in range(now.size):
+        same = same and (before[i] > 0.0) == (now[i] > 0.0)
+    return same
+
+
+@inner
 def _keeps_contacts(physics):
     """Whether no contact changes in the step that was tried."""
     contacts, following = physics.plant.contacts, physics.following
@@ -283,9 +334,10 @@ def move(physics, course, what, length, at, said):
     channels, periods, limits, log = course.channels, course.periods, course.limits, course.log
     same, span = SAME * periods.step, length
     time, step, event, part = at.time, at.step, at.event, at.part
-    begin = time
+    begin, whole = time, False  # only a step from one multiple of the period to the next is whole
     profiled = plant.contacts.ground_x.size > 0 or plant.contacts.closed.size == 0
     while True:
+        first = event
         if what == GLIDE:
             if part == WATCH:
                 part = EVENTS
@@ -309,8 +361,10 @@ def move(physics, course, what, length, at, said):
                     _record(physics, channels, time, log, row)
                 if step == periods.steps:
                     return END, time, Cursor(time, step, event, part)
-                part = MOVE
-            begin, end = time, (step + 1) * periods.step
+                part, whole = MOVE, profiled
+            begin, end, first = time, (step + 1) * periods.step, event
+            if whole:
+                event = _passed(physics.held, channels, event, begin, end - same)
             time, part = end, WATCH
             if event < channels.due.size and channels.due[event] < end - same:
                 time, part = channels.due[event], INSIDE
@@ -325,7 +379,15 @@ def move(physics, course, what, length, at, said):
         solved = take_step(physics, span)
         if what == STEP:
             return SETTLED if solved else UNSOLVABLE, 0.0, at
-        if not (solved and _keeps_contacts(physics)):
+        done = solved and _keeps_contacts(physics)
+        if not done or (event > first and not _keeps_sliding(physics)):
             copy(physics.memory.yielding, plant.contacts.yielding)
-            return BLOCKED, begin, Cursor(time, step, event, part)
-        accept(physics)
+            if event == first:
+                return BLOCKED, begin, Cursor(time, step, event, part)
+            step -= part == WATCH  # again, in parts that end at its events
+            time, event, part = begin, first, MOVE
+        else:
+            _pass(physics, channels, first, event, span)
+            accept(physics)
+        physics.held.change[0] = physics.held.look[0] = np.inf
+        whole = False

@@ -179,17 +179,18 @@ class UndelayedWork:
         """Take the motor angles (n,) at which ``command`` holds."""
         here, before = (theta.copy(), self.command.copy()), self._done
         if self._last:
-            gained = _trapezoid(self._last[-1], here)
-            self.work += gained
-            self._done = float(gained.sum())
+            mean, way = _trapezoid(self._last[-1], here)
+            self._done = float(mean.dot(way))
+            self.work += np.multiply(mean, way, out=mean)
         if len(self._last) == 2:
-            both = float(_trapezoid(self._last[0], here).sum())
-            self.rough += 0.5 * abs(both - before - self._done)
+            mean, way = _trapezoid(self._last[0], here)
+            self.rough += 0.5 * abs(float(mean.dot(way)) - before - self._done)
         self._last = [*self._last[-1:], here]
 
 
-def _trapezoid(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
-    return 0.5 * (start[1] + end[1]) * (end[0] - start[0])
+def _trapezoid(start: tuple[Array, Array], end: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Mean command and way (n,) of an interval; their products are the works."""
+    return 0.5 * (start[1] + end[1]), end[0] - start[0]
 
 
 class Books(NamedTuple):

@@ -319,7 +319,7 @@ class _Loop:
         command = channels.commands[tick % len(channels.commands)]
         command[:] = 0.0
         self._ask(self.controller.tick, t, self.received, command)
-        if not math.isfinite(command.sum()):
+        if not math.isfinite(sum(command.tolist())):
             raise PlantStop(
                 Outcome.CONTROLLER_FAILED, f"the command at t = {t:.4f} s is not finite"
             )

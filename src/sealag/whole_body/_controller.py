@@ -56,6 +56,7 @@ class Controller:
         self._law = LawEvaluation(
             robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
         )
+        self._damped = law.damped  # asked of the tasks once, not at each tick
         self._signal = law.signal.start(self._law, delay_bound=delay_bound)
 
     @property
@@ -93,9 +94,13 @@ class Controller:
         rate = self._refer(t)
         self._signal.command(t, measurement, out)
         self._law.keep_following()
-        if rate is not None and self.law.velocity_feedforward:
+        if rate is not None:
             rate = np.array(rate, dtype=float)
             self._law.leave_to_higher(rate)
+        if self._damped:
+            links = self.law.signal.of_links
+            out += self._law.drag(measurement.v_joint if links else measurement.theta_dot, rate)
+        if rate is not None and self.law.velocity_feedforward:
             theta_dot = np.linalg.lstsq(self._law.space.J_star, rate, rcond=1e-6)[0]
             out += self._motor_damping * theta_dot
 
@@ -117,7 +122,7 @@ class Controller:
         energy, joints = self._signal.present(measurement, command)
         match self.law.gravity:
             case GravityCompensation.PLANNED:
-                energy -= float(self._law.planned_gravity @ joints)
+                energy -= float(self._law.planned_gravity.dot(joints))
             case GravityCompensation.FEEDBACK:
                 energy -= self._law.work_of_gravity(measurement.q, joints)
         return energy

@@ -92,6 +92,7 @@ class LawEvaluation:
             fed_back=law.gravity is GravityCompensation.FEEDBACK,
         )
         self.planned_gravity, self._measured = gains.planned_gravity, self.running()
+        self._drag = law.drag(robot) if law.damped else None
         self._kept = keep(self._allocate(frames, tasks, gains))
         self.follow(np.asarray(posture, dtype=float))
         if law.gravity is GravityCompensation.PLANNED:
@@ -229,11 +230,34 @@ class LawEvaluation:
             if turned < SETTLED:
                 return
 
+    def task_energy(self) -> float:
+        """Return ½ x̃ᵀ S x̃ of the current error and matrices, J."""
+        return 0.5 * float(self.error.dot(self.space.stiffness.dot(self.error)))
+
     def torque(self, out: Array) -> None:
         """Write l (n,) of the current error and matrices."""
         space = self.space
         gravity = space.gravity if self.gravity_is_fed_back else self.planned_gravity
         out[:] = space.J_star.T @ (space.stiffness @ self.error) + gravity
+
+    def drag(self, rates: Array, wanted: Array | None) -> Array:
+        """Return J*ᵀ D_x (ẋ_d − J* q̇) (n,), Nm, where the law was last evaluated.
+
+        Args:
+            rates: (n,) measured, rad/s.
+            wanted: (m,) ẋ_d; None for 0.
+        """
+        if self._drag is None:
+            return np.zeros(self.robot.n)
+        J_star = self.space.J_star
+        away = -(J_star @ rates) if wanted is None else wanted - J_star @ rates
+        return J_star.T @ (self._drag @ away)
+
+    def drag_slope(self) -> Array:
+        """Return −J*ᵀ D_x J* (n, n), Nms/rad, where the law was last evaluated."""
+        if self._drag is None:
+            return np.zeros((self.robot.n, self.robot.n))
+        return -self.space.J_star.T @ self._drag @ self.space.J_star
 
     def leave_to_higher(self, rate: Array) -> None:
         """Project the rates (m,) of the tasks into the null space of the higher tasks, in place."""

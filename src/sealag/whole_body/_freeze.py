@@ -1,6 +1,6 @@
 """Any controller, frozen: what ticks is differentiated about a state at rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -106,13 +106,15 @@ def freeze(
     C_v[:, base:] -= slopes.torque * actuators.spring_damping
     loop = FrozenLoop.with_derivative(
         robot,
-        LawDerivative.memoryless(C_q, slopes.theta + slopes.torque @ K),
+        replace(
+            LawDerivative.memoryless(C_q, slopes.theta + slopes.torque @ K),
+            C_v=C_v,
+            C_rate=slopes.theta_dot + slopes.torque * actuators.spring_damping,
+        ),
         actuators,
         contacts=contacts,
         rest=rest,
         embedded_delay=embedded_delay,
-        C_v=C_v,
-        C_theta_dot=slopes.theta_dot + slopes.torque * actuators.spring_damping,
     )
     return FrozenController(loop=loop, rest=rest, bend=narrow.change(wide), memory=slopes.memory)
 

@@ -146,6 +146,23 @@ class FrozenLoop(DelayedLoop):
             return found
         return replace(found, delay=0.0, unstable_roots=drifting, guaranteed=False)
 
+    def channels(self) -> dict[str, float]:
+        """Return the exact margin, s, if one channel of the command is late and the other is not.
+
+        The channels are "positions" and "rates": angles and what the law remembers, and what it
+        takes from velocities.
+
+        Raises:
+            SolverError: a margin is not known.
+        """
+        rates = np.array([name.startswith("d/dt ") for name in self.states])
+        found = {}
+        for name, columns in (("positions", ~rates), ("rates", rates)):
+            late = np.where(columns, self.C, 0.0)
+            alone = replace(self, A_0=self.A_0 + self.B @ (self.C - late), C=late)
+            found[name] = float(alone.margin().delay)
+        return found
+
     @classmethod
     def of(
         cls,
@@ -188,6 +205,9 @@ class FrozenLoop(DelayedLoop):
         )
         signal = law.signal.start(evaluation, delay_bound=0.0)
         command = signal.derivative(rest.q, rest.theta)
+        if law.damped:
+            signal.settled(rest.q, rest.theta, np.zeros(robot.n))
+            command = command.with_drag(evaluation.drag_slope(), of_links=law.signal.of_links)
         bend = 0.0
         if beside is not None:
             bend = command.change(signal.derivative(rest.q, rest.theta, beside))
@@ -211,8 +231,6 @@ class FrozenLoop(DelayedLoop):
         contacts: tuple[Contact, ...],
         rest: Rest,
         embedded_delay: float | None = None,
-        C_v: Array | None = None,
-        C_theta_dot: Array | None = None,
     ) -> Self:
         """Close the loop of links, motors and drives with the derivative of any law.
 
@@ -223,8 +241,6 @@ class FrozenLoop(DelayedLoop):
             contacts: which frames are held.
             rest: where the loop rests.
             embedded_delay: how late torque feedback is in the drives, s; None for without delay.
-            C_v: (n, nv) command of tangent velocities, Nms/rad; None for none.
-            C_theta_dot: (n, n) command of motor velocities, Nms/rad; None for none.
 
         Returns:
             The frozen loop.
@@ -251,10 +267,8 @@ class FrozenLoop(DelayedLoop):
             embedded_delay=embedded_delay,
         )
         C, at = loop.C.copy(), _Places(links.Z.shape[1], robot.n, drives=0, memory_size=0)
-        if C_v is not None:
-            C[:, at.z_rate] += C_v @ links.Z
-        if C_theta_dot is not None:
-            C[:, at.theta_rate] += C_theta_dot
+        C[:, at.z_rate] += command.C_v @ links.Z
+        C[:, at.theta_rate] += command.C_rate
         return replace(loop, C=C)
 
     @classmethod

@@ -10,7 +10,10 @@ from sealag.whole_body._tasks import GravityCompensation
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Law(TaskLaw):
-    """τ_osc = Σ_k J*_{k|prec}ᵀ S_k x̃_k + ḡ, Eqs. (10)-(17), taken at the fed-back signal.
+    """τ_osc = Σ_k J*_{k|prec}ᵀ (S_k x̃_k + D_k x̃̇_k) + ḡ, Eqs. (10)-(17), at the fed-back signal.
+
+    x̃̇ = ẋ_d − J* θ̇, or of q̇_j where link angles are fed back. D is 0 in the paper, whose damping is
+    that of the drives.
 
     Attributes:
         tasks: the tasks; those of equal priority share a level, in the order given.

@@ -31,7 +31,7 @@ _LONGEST_STEP = 0.2  # rad: a longer Newton step leaves the region where its dir
 _HALVINGS = 12
 _QUICK = 0.1
 """Part of the residual that a step may leave for the law's derivative to serve once more: one costs
-as much as thirty steps, so that it is taken anew only where it no longer leads on."""
+as much as ten steps, so that it is taken anew only where it no longer leads on."""
 
 _PATIENCE = 12  # whole steps that need not bring the least residual yet
 _CUTOFF = 1e-10  # of the largest singular value: directions along which nothing acts (symmetries)
@@ -155,16 +155,16 @@ class _Search:
         ones: a soft law sags past where the residual is larger."""
         q, theta = self._posture, self._first(self._posture)
         residual = self._residual(q, theta)
-        least, since, slope = self._size(residual), 0, None
+        least, since, slope = self._size(residual), 0, None  # slope: of the law and of the links
         for _ in range(_ROUNDS):
             if self._small(residual):
                 if slope is not None:  # digits that a last Newton step would have brought
-                    step = self._newton(q, theta, residual, slope)
+                    step = self._newton(q, residual, slope)
                     q, theta, _, _ = self._search(q, theta, step, residual, falling=True)
                 return q, theta
             kept, before = slope is not None, self._size(residual)
-            slope = slope or self._signal.derivative(q, theta)
-            step = self._newton(q, theta, residual, slope)
+            slope = slope or self._slope(q, theta)
+            step = self._newton(q, residual, slope)
             q, theta, residual, moved = self._search(q, theta, step, residual, falling=falling)
             if self._size(residual) > _QUICK * before:
                 slope = None
@@ -235,17 +235,25 @@ class _Search:
         away, force, torque = (float(np.linalg.norm(part)) for part in residual)
         return away + (force + torque) / self._scale
 
+    def _slope(self, q: Array, theta: Array) -> tuple[LawDerivative, Array]:
+        """Derivative of the law, and ∂(g − J_sᵀ λ − Uᵀ τ)/∂q (nv, nv)."""
+        robot = self._robot
+        springs = self._K * (theta - robot.joint_positions(q))
+        H = self._plant.stiffness(q, springs, np.eye(robot.nv))
+        H[robot.nv_base :, robot.nv_base :] += np.diag(self._K)
+        return self._signal.derivative(q, theta, rough=True), H
+
     def _newton(
-        self, q: Array, theta: Array, residual: tuple[Array, Array, Array], slope: LawDerivative
+        self,
+        q: Array,
+        residual: tuple[Array, Array, Array],
+        slopes: tuple[LawDerivative, Array],
     ) -> Array:
         """Step (nv + n,) of least norm."""
         robot, n, K = self._robot, self._robot.n, np.diag(self._K)
-        base = robot.nv_base
+        base, (slope, H) = robot.nv_base, slopes
         J_s = self._plant.jacobian(q)
         Z = null_space(J_s, robot.nv)
-        springs = self._K * (theta - robot.joint_positions(q))
-        H = self._plant.stiffness(q, springs, np.eye(robot.nv))
-        H[base:, base:] += K
         coupling = np.vstack([np.zeros((base, n)), -K])
         C_q, C_theta = slope.C_q, slope.C_theta
         if len(slope.A):  # at rest the memory has settled: A ξ + B δ = 0

@@ -1,6 +1,6 @@
 """Running signals: the fed-back angles from tick to tick, and the law's derivative at rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -15,6 +15,10 @@ STEP = 2e-5
 """rad, m: half the base of central differences of the command, extrapolated with those of half the
 base. Near singular postures, where the law bends within 1e-3 rad, plain differences of 1e-5 rad
 leave 1e-5 of the derivative; these leave 5e-9, of which half is rounding."""
+
+_ROUGH = 1e-6
+"""rad, m: step of one-sided differences. Ten times larger leaves 1e-2 of the derivative where the
+law bends within 1e-3 rad, ten times smaller 1e-5 by rounding of the settled command."""
 
 
 class Present(NamedTuple):
@@ -32,7 +36,7 @@ class Present(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawDerivative:
     """The law about a state at rest, with memory ξ: ξ̇ = A ξ + B_q δq + B_theta δθ + B_rate δθ̇ and
-    δτ_osc = C ξ + C_q δq + C_theta δθ.
+    δτ_osc = C ξ + C_q δq + C_theta δθ + C_v δv + C_rate δθ̇.
 
     Attributes:
         A: (s, s) 1/s; s = 0 for a law without memory.
@@ -42,6 +46,8 @@ class LawDerivative:
         C: (n, s).
         C_q: (n, nv) along tangent motions, Nm/rad.
         C_theta: (n, n), Nm/rad.
+        C_v: (n, nv) of tangent velocities, Nms/rad.
+        C_rate: (n, n) of motor velocities, Nms/rad.
     """
 
     A: Array
@@ -51,10 +57,12 @@ class LawDerivative:
     C: Array
     C_q: Array
     C_theta: Array
+    C_v: Array
+    C_rate: Array
 
     @classmethod
     def memoryless(cls, C_q: Array, C_theta: Array) -> "LawDerivative":
-        """Return the derivative of a law without memory.
+        """Return the derivative of a law without memory that feels no rates.
 
         Args:
             C_q: (n, nv).
@@ -64,8 +72,21 @@ class LawDerivative:
         none = np.zeros((0, n))
         return cls(
             A=np.zeros((0, 0)), B_q=np.zeros((0, nv)), B_theta=none, B_rate=none, C=none.T,
-            C_q=C_q, C_theta=C_theta,
+            C_q=C_q, C_theta=C_theta, C_v=np.zeros((n, nv)), C_rate=np.zeros((n, n)),
         )  # fmt: skip
+
+    def with_drag(self, slope: Array, *, of_links: bool) -> "LawDerivative":
+        """Return the derivative of the law with damping that is computed from rates.
+
+        Args:
+            slope: (n, n) its command by joint rates, Nms/rad.
+            of_links: whether the rates are those of the links.
+        """
+        if not of_links:
+            return replace(self, C_rate=slope)
+        C_v = np.zeros_like(self.C_v)
+        C_v[:, C_v.shape[1] - len(slope) :] = slope
+        return replace(self, C_v=C_v)
 
     def change(self, other: "LawDerivative") -> float:
         """Return how far another derivative of the same law lies from this one, as a share of it.
@@ -127,13 +148,16 @@ class SignalState(Protocol):
         """
         ...
 
-    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
+    def derivative(
+        self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
+    ) -> LawDerivative:
         """Return the derivative of what runs, about a state that does not move.
 
         Args:
             q: (nq,) configuration.
             theta: (n,) motor angles, rad.
             width: half the base of the central differences, rad and m.
+            rough: one-sided differences instead, as Newton's method needs: a fourth of the cost.
         """
         ...
 
@@ -167,8 +191,7 @@ class MeasuredAngles:
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command of the true state."""
         self.command(0.0, measurement, out)
-        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
-        return Present(energy, self._joints(measurement.q, measurement.theta))
+        return Present(self._law.task_energy(), self._joints(measurement.q, measurement.theta))
 
     def deflection(self, carried: Array) -> Array:
         """Return 0 for motor angles, K⁻¹ ḡ for link angles."""
@@ -176,35 +199,46 @@ class MeasuredAngles:
 
     def settled(self, q: Array, theta: Array, out: Array) -> None:
         """Write the command of a state that does not move."""
+        self._law.follow(q)
+        self._settle(q, theta, out)
+
+    def _settle(self, q: Array, theta: Array, out: Array) -> None:
+        """The same, from the motions along which the base followed the joints of a state nearby."""
         law, joints = self._law, self._joints(q, theta)
         away = joints - law.robot.joint_positions(q)
-        law.follow(q)
         law.settled(lambda: law.at(q, joints, out), lambda: away)
 
-    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
+    def derivative(
+        self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
+    ) -> LawDerivative:
         """Differentiate the settled command."""
-        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta, width))
+        self._law.follow(q)
+        return LawDerivative.memoryless(
+            *_differences(self._law, self._settle, q, theta, 0.0 if rough else width)
+        )
 
 
 def _differences(
     law: LawEvaluation, function, q: Array, theta: Array, width: float, *, rows: int = 0
 ):
     """∂f/∂q (k, nv) and ∂f/∂θ (k, n) of function(q, θ, out), by central differences extrapolated to
-    none: (4 D(h/2) − D(h)) / 3."""
+    none: (4 D(h/2) − D(h)) / 3; by one-sided ones of `_ROUGH` where the width is 0."""
     robot = law.robot
-    k = rows or robot.n
-    ahead, behind = np.zeros(k), np.zeros(k)
-    by_q, by_theta = np.zeros((k, robot.nv)), np.zeros((k, robot.n))
-    for h, share in ((width / 2.0, 4.0 / 3.0), (width, -1.0 / 3.0)):
-        for i, step in enumerate(h * np.eye(robot.nv)):
-            function(robot.integrate(q, step), theta, ahead)
-            function(robot.integrate(q, -step), theta, behind)
-            by_q[:, i] += share * (ahead - behind) / (2.0 * h)
-        for i, step in enumerate(h * np.eye(robot.n)):
-            function(q, theta + step, ahead)
-            function(q, theta - step, behind)
-            by_theta[:, i] += share * (ahead - behind) / (2.0 * h)
-    return by_q, by_theta
+    k, nv, eye = rows or robot.n, robot.nv, np.eye(robot.nv + robot.n)
+    weights = [(_ROUGH, 1.0 / _ROUGH), (0.0, -1.0 / _ROUGH)]
+    if width:
+        near, far = 4.0 / (3.0 * width), 1.0 / (6.0 * width)
+        weights = [(width / 2.0, near), (-width / 2.0, -near), (width, -far), (-width, far)]
+    found, out, here = np.zeros((k, nv + robot.n)), np.zeros(k), np.zeros(k)
+    function(q, theta, here)
+    for i, direction in enumerate(eye):
+        for h, weight in weights:
+            out[:] = here
+            if h:
+                step = h * direction
+                function(robot.integrate(q, step[:nv]) if i < nv else q, theta + step[nv:], out)
+            found[:, i] += weight * out
+    return found[:, :nv], found[:, nv:]
 
 
 class StaticState:
@@ -234,8 +268,8 @@ class StaticState:
         """Write the command at the settled q̄: V_3 at q̄ less ½ lᵀ K⁻¹ l."""
         sag = self.followed.sag.copy()
         self._law.static(measurement.q, measurement.theta, sag, out)
-        energy = 0.5 * float(self._law.error @ self._law.space.stiffness @ self._law.error)
-        energy -= 0.5 * float(out @ (out / self._law.spring_stiffness))
+        energy = self._law.task_energy()
+        energy -= 0.5 * float(out.dot(out / self._law.spring_stiffness))
         return Present(energy, measurement.theta + sag)
 
     def deflection(self, carried: Array) -> Array:
@@ -250,9 +284,13 @@ class StaticState:
         law.follow(q)
         law.settled(lambda: law.static(q, theta, sag, out), lambda: theta + sag - joints)
 
-    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
+    def derivative(
+        self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
+    ) -> LawDerivative:
         """Differentiate the settled command."""
-        return LawDerivative.memoryless(*_differences(self._law, self.settled, q, theta, width))
+        return LawDerivative.memoryless(
+            *_differences(self._law, self.settled, q, theta, 0.0 if rough else width)
+        )
 
 
 class TankState:
@@ -286,14 +324,13 @@ class TankState:
     def present(self, measurement: Measurement, out: Array) -> Present:
         """Write the command with x̂ carried on by J* from the last measured θ to the true one."""
         law, tank, static = self._law, self._tank, self._static.followed
-        energy, _ = self._static.present(measurement, out)
+        self._static.present(measurement, out)
         self._matrices(measurement.q, measurement.theta)
         if static.started[0]:
             carried = law.space.J_star @ (measurement.theta - static.theta)
             law.error[:] = law.wanted - tank.position - carried
         law.torque(out)
-        energy = 0.5 * float(law.error @ law.space.stiffness @ law.error) + tank.energy
-        return Present(energy, measurement.theta)
+        return Present(law.task_energy() + tank.energy, measurement.theta)
 
     def deflection(self, carried: Array) -> Array:
         """Return that of q̄(θ)."""
@@ -320,13 +357,15 @@ class TankState:
         law.error[:] = law.wanted - position
         law.torque(out)
 
-    def derivative(self, q: Array, theta: Array, width: float = STEP) -> LawDerivative:
+    def derivative(
+        self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
+    ) -> LawDerivative:
         """Return x̂̇ = J* θ̇ + rate (x(q̄) − x̂) while the tank can pay, and x̂ = J* θ while it cannot.
 
         What the tank holds changes with the square of the motion, so that near a rest it pays for
         all that u does as long as it holds anything.
         """
-        law, m = self._law, self._law.rows
+        law, m, width = self._law, self._law.rows, 0.0 if rough else width
         target, command = np.zeros(m), np.zeros(law.robot.n)
         self._target(q, theta, target)
         C_q, C_theta = _differences(
@@ -340,5 +379,5 @@ class TankState:
         rate = self._tank.rate
         return LawDerivative(
             A=-rate * np.eye(m), B_q=rate * T_q, B_theta=rate * T_theta, B_rate=J, C=C,
-            C_q=C_q, C_theta=C_theta,
+            C_q=C_q, C_theta=C_theta, C_v=np.zeros_like(C_q), C_rate=np.zeros_like(C_theta),
         )  # fmt: skip

@@ -41,12 +41,14 @@ class Signal(ABC):
     Attributes:
         name: its word in project files and certificates.
         has_potential: whether its feedback is collocated with the motors.
+        of_links: whether rates are those of the links instead of the motors'.
         rests_at_posture: whether the task error is 0 in the posture although springs carry gravity
             there, and the signal has no memory.
     """
 
     name: ClassVar[str]
     has_potential: ClassVar[bool] = True
+    of_links: ClassVar[bool] = False
     rests_at_posture: ClassVar[bool] = False
 
     @staticmethod
@@ -115,6 +117,7 @@ class LinkAngles(Signal):
 
     name: ClassVar[str] = "joint"
     has_potential: ClassVar[bool] = False
+    of_links: ClassVar[bool] = True
 
     def refusal(self, contraction: Array) -> Refusal:
         return Refusal(

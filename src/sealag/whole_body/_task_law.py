@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from itertools import groupby
 
+import numpy as np
+
 from sealag.errors import InputError, word
 from sealag.robot import Robot
 from sealag.typing import Array
@@ -19,7 +21,7 @@ from sealag.whole_body._tasks import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskLaw:
-    """τ_osc = Σ_k J*_{k|prec}ᵀ S_k x̃_k + ḡ, Eqs. (10)-(17).
+    """τ_osc = Σ_k J*_{k|prec}ᵀ (S_k x̃_k + D_k x̃̇_k) + ḡ, Eqs. (10)-(17).
 
     Attributes:
         tasks: the tasks; those of equal priority share a level, in the order given.
@@ -94,3 +96,16 @@ class TaskLaw:
             robot: the robot.
         """
         return block_diagonal([t.gain(len(t.rows(robot).rows)) for t in self.ordered])
+
+    def drag(self, robot: Robot) -> Array:
+        """Return D_x of all tasks, (m, m), blocks by priority on the diagonal.
+
+        Args:
+            robot: the robot.
+        """
+        return block_diagonal([t.drag(len(t.rows(robot).rows)) for t in self.ordered])
+
+    @property
+    def damped(self) -> str:
+        """The first task whose damping the controller computes; empty if there is none."""
+        return next((task.name for task in self.ordered if np.any(task.damping)), "")

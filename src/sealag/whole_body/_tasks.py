@@ -104,6 +104,8 @@ class Task:
         axes: which rows are controlled, out of x, y, z (then rotations about x, y, z for pose);
             empty means all. World axes.
         priority: 1 is the highest; tasks of equal priority share one level.
+        damping: D_x that the controller computes from measured rates, late as the stiffness is,
+            (m, m); a scalar or m numbers become its diagonal. Always N s/m and Nm s/rad.
     """
 
     name: str
@@ -113,6 +115,7 @@ class Task:
     joints: tuple[str, ...] = ()
     axes: tuple[int, ...] = ()
     priority: int = 1
+    damping: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a task.
@@ -174,10 +177,24 @@ class Task:
         Raises:
             InputError: the stiffness has another size, is not finite, not symmetric or negative.
         """
-        return stiffness_matrix(self.stiffness, size, what=f"Task {self.name}: stiffness")
+        return gain_matrix(self.stiffness, size, what=f"Task {self.name}: stiffness")
+
+    def drag(self, size: int) -> Array:
+        """Return D_x as a matrix.
+
+        Args:
+            size: number of rows m.
+
+        Returns:
+            (m, m) symmetric positive semidefinite matrix, N s/m and Nm s/rad.
+
+        Raises:
+            InputError: the damping has another size, is not finite, not symmetric or negative.
+        """
+        return gain_matrix(self.damping, size, what=f"Task {self.name}: damping")
 
 
-def stiffness_matrix(values: ArrayLike, size: int, *, what: str) -> Array:
+def gain_matrix(values: ArrayLike, size: int, *, what: str) -> Array:
     """Return a scalar, a diagonal or a matrix of gains as a matrix.
 
     Args:
