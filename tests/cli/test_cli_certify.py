@@ -2,14 +2,18 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
+from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import sealag
 from helpers.designs import EXAMPLES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -122,7 +126,9 @@ def test_proofs_are_as_many_as_asked_for(tmp_path, cli):
         counts[proofs] = len(json.loads(out.read_text())["proofs"])
         code, text, _ = cli("verify", out)
         assert code == 0
-        assert text.splitlines()[-1].startswith("the certificate holds: as it states, the design is")
+        assert text.splitlines()[-1].startswith(
+            "the certificate holds: as it states, the design is"
+        )
     assert counts == {"3": 3, "all": len(motion)}
     for wrong in ("0", "-1", "some", "²"):
         code, _, err = cli("certify", "bundled:hume", f"--proofs={wrong}", "--out", out)
@@ -216,8 +222,6 @@ def test_the_starter_s_units_and_names_are_told(tmp_path, cli):
 
 
 def test_help_and_version(cli):
-    import sealag
-
     code, out, _ = cli("--version")
     assert (code, out) == (0, f"sealag {sealag.__version__}\n")
     for ask in (["-h"], ["--help"]):
@@ -239,6 +243,73 @@ def test_installed_command_prints_json_only(tmp_path):
     assert json.loads(done.stdout)["status"] == "not_certified"
     assert done.stderr == ""
     assert np.isfinite(json.loads(done.stdout)["max_delay_s"])
+
+
+def test_what_is_passive_only_is_a_no_unless_it_is_allowed(tmp_path, cli):
+    """Standing on two points Hume falls, whatever its delay; a long one is no question of it."""
+    text = (resources.files("sealag") / "data" / "hume.toml").read_text(encoding="utf-8")
+    for late in ("central_round_trip", "embedded_round_trip"):
+        text = re.sub(
+            rf"(?m)^{late} = .*$", f'{late} = {{ kind = "constant", value_ms = 1.0 }}', text
+        )
+    project, out = tmp_path / "hume.toml", tmp_path / "c.json"
+    project.write_text(text, encoding="utf-8")
+    certify = ("certify", project, "--out", out)
+    assert cli(*certify, "--json")[0] == 1
+    assert cli(*certify, "--allow-unstable")[0] == 0
+    code, told, _ = cli(*certify)
+    lines = told.splitlines()
+    assert code == 1
+    assert lines[0].startswith("passive up to 8.96 ms; your delay is ")
+    assert lines[1] == f"{'verdict':26} passive only (certified criterion)"
+    assert any(line.startswith("passive only because the posture is no stable") for line in lines)
+    assert cli("verify", out)[1].endswith("passive only, not shown to be stable\n")
+    assert cli("certify", "bundled:hume", "--out", out, "--allow-unstable")[0] == 1
+
+
+def test_nothing_is_written_that_the_check_refuses(tmp_path, cli, monkeypatch):
+    """A bound that its proof does not carry; a margin that no root crosses at is withdrawn."""
+    held, out = EXAMPLES / "hume_held.toml", tmp_path / "c.json"
+    good = sealag.certify(sealag.load(held))
+    answer, evidence = good.answer, good.evidence
+    (proof,) = evidence.proofs
+    wrong = replace(evidence, proofs=(replace(proof, F=2.0 * proof.F),))
+    later = replace(evidence, instant_margins_s=(2.0 * answer.local_margin_s,))
+    claim = replace(
+        answer,
+        local_margin_s=2.0 * answer.local_margin_s,
+        first_crossing_s=2.0 * answer.local_margin_s,
+        conservatism=2.0 * answer.local_margin_s / answer.max_delay_s,
+    )
+
+    def answers(certificate):
+        monkeypatch.setattr("sealag.design.certify", lambda *_words, **_options: certificate)
+        return cli("certify", held, "--out", out)
+
+    code, text, err = answers(replace(good, evidence=wrong))
+    assert (code, text, out.exists()) == (3, "", False)
+    assert err.startswith("sealag: The certificate's own check does not confirm ")
+    assert err.count("\n") == 1
+    code, text, err = answers(replace(good, answer=claim, evidence=later))
+    assert (code, err) == (1, "")
+    assert "whether it is stable stays open" in text.splitlines()[0]
+    assert "own check does not confirm them" in text
+    assert cli("verify", out)[0] == cli("verify", out, "--second")[0] == 0
+    assert (answers(good)[0], cli("verify", out)[0]) == (0, 0)
+
+
+def test_a_bound_beyond_all_networks_is_told_as_people_say_it(tmp_path, cli):
+    project, out = tmp_path / "slow.toml", tmp_path / "c.json"
+    text = (EXAMPLES / "hume_held.toml").read_text(encoding="utf-8")
+    slow = re.sub(r"motor_damping = [0-9.]+", "motor_damping = 1e5", text)
+    assert slow != text
+    project.write_text(slow, encoding="utf-8")
+    code, told, _ = cli("certify", project, "--out", out)
+    lines = told.splitlines()
+    assert code == 0
+    assert lines[0].startswith("tolerates more than 5 s: delay is not what limits this design; ")
+    (largest,) = (line for line in lines if line.startswith("largest delay"))
+    assert re.fullmatch(r"largest delay +\d+ (s|h|days|years)", largest)
 
 
 @pytest.mark.parametrize("criterion", ["certified", "published"])

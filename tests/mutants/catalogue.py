@@ -25,9 +25,12 @@ TESTS = {
                  "tests/unit/test_passivity_motion.py tests/unit/test_passivity_windows.py "
                  "tests/unit/test_passivity_verify.py tests/unit/test_certificate_forgeries.py "
                  "tests/unit/test_certificate_local.py tests/unit/test_certificate_edges.py "
-                 "tests/unit/test_certificate_drives.py tests/oracle/test_passivity_multitask.py "
+                 "tests/unit/test_certificate_drives.py tests/unit/test_certificate_verdict.py "
+                 "tests/unit/test_certificate_confirmed.py "
+                 "tests/oracle/test_passivity_multitask.py "
                  "tests/oracle/test_passivity_against_sdp.py",
-    "design": "tests/unit/test_design_local.py tests/unit/test_design_motors.py "
+    "design": "tests/unit/test_certificate_verdict.py "
+              "tests/unit/test_design_local.py tests/unit/test_design_motors.py "
               "tests/unit/test_design_thresholds.py tests/unit/test_design_conditions.py "
               "tests/unit/test_design_jitter.py tests/unit/test_design_rates.py "
               "tests/unit/test_design_joint_pd.py tests/unit/test_design_program.py "
@@ -374,6 +377,18 @@ MUTANTS = [
          "refuted = True", "a worst motion that is not active"),
     ),
     *_of(
+        "passivity", "passivity/_axis.py",
+        ("turn[rows] = angle + 2.0 * math.pi * np.round((shifted.imag - angle) / 2.0 / math.pi)",
+         "turn[rows] = angle", "equal joints that turn by 2π together"),
+    ),
+    *_of(
+        "passivity", "passivity/_claims.py",
+        ("Status.CERTIFIED if answer.stable is True and rests else",
+         "Status.CERTIFIED if rests else",
+         "a forged certified of what falls"),
+        ("or undercut or lost:", "or undercut:", "a forged certified beyond the margin"),
+    ),
+    *_of(
         "passivity", "passivity/_local.py",
         ("aside = float(np.abs(self.A_1[:, others]).max(initial=0.0))", "aside = 0.0",
          "a coupled law"),
@@ -401,8 +416,13 @@ MUTANTS = [
     ),
     *_of(
         "design", "design/_certify.py",
-        ("if not reasons and delay_s > largest:", "if not reasons and delay_s > 2.0 * largest:",
+        ("if not reasons and (delay_s > largest or",
+         "if not reasons and (delay_s > 2.0 * largest or",
          "a delay that is too long is certified"),
+        ("if exact[k] > delay_s:", "if exact[k] > 0.0:", "a loop that its delay destabilises"),
+        ("    if local.stable:\n        return []",
+         "    if local.stable is not None:\n        return []",
+         "certified although it falls"),
         ("if case.rest is not None and not case.rest.found:", "if False:",
          "a loop without equilibrium is certified"),
         ("if case.kind is Criterion.CERTIFIED and not reasons:\n        reasons += _undercut(case)",
@@ -615,7 +635,8 @@ MUTANTS = [
     ),
     *_of(
         "units", "units.py",
-        ("if value_s > LONGEST_DELAY_S:", "if value_s > 1e3 * LONGEST_DELAY_S:",
+        ("if value_s > LONGEST_DELAY_S:\n        raise",
+         "if value_s > 1e3 * LONGEST_DELAY_S:\n        raise",
          "milliseconds taken for seconds"),
         ("return value_ms * 1e-3", "return value_ms * 1e-6", "milliseconds"),
     ),

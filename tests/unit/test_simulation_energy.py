@@ -288,6 +288,29 @@ class TestPassivityObserver:
         assert run.audit.delay_side is None
         assert run.audit.delay_injection is None
 
+    @pytest.mark.parametrize(("share", "passive"), [(7e-11, True), (1e-7, False)])
+    def test_rounding_of_large_energies_is_no_violation(self, tmp_path, share, passive):
+        """A potential of 200 J that iterations know to 1.4e-8 J, of a robot that stands still; one
+        that jumps by 2e-5 J is the control. Before the first tick, potential and motion agree."""
+
+        class Jumping(StoringPD):
+            def storage(self, t, measurement, command):
+                return 200.0 * (1.0 + share * (t > 0.0)) + super().storage(t, measurement, command)
+
+        robot = wheel(tmp_path, inertia=1.0)
+        springs = Actuators.of(
+            robot.joints, spring_stiffness=350.0, rotor_inertia=0.09, motor_damping=10.0
+        )
+        run = closed_loop(
+            robot, springs, Jumping(np.zeros(1), stiffness=100.0, motor=True),
+            q=np.zeros(1), theta=np.zeros(1), duration=0.1,
+        )  # fmt: skip
+        side = run.audit.controller_side
+        assert side.slack.min() == pytest.approx(-200.0 * share, rel=1e-3)
+        assert side.passive is passive
+        assert side.tolerance == pytest.approx(1e-9 * 200.0, rel=1e-6)
+        assert run.audit.joint_side.tolerance < 1e-12, "nothing moves, and nothing is stored there"
+
     def test_a_law_without_a_potential_is_told_from_the_delay(self, tmp_path):
         """Stiffness that is said to be half of what it is: the law gives, the delay does not."""
 
