@@ -556,7 +556,8 @@ MUTANTS = [
     ),
     *_of(
         "robot", "robot/_load.py",
-        ("limit.set(\"upper\", \"1e9\")", "limit.set(\"upper\", \"3.2\")", "continuous joints"),
+        ("joint.set(\"type\", \"revolute\")", "joint.set(\"type\", \"continuous\")",
+         "continuous joints"),
         ("at[model.joints[number].idx_q] = followers[name].offset", "pass",
          "followers that are locked"),
         ("weak = (own < LEAST_INERTIA) |", "weak = (own < 0.0) |", "links without inertia"),
