@@ -1,5 +1,6 @@
 """From a system and a motion to a certificate."""
 
+import re
 import sys
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -248,6 +249,10 @@ def _answer(case: _Case) -> Answer:
     )
 
 
+_LONGEST_VERSION = 256
+"""Characters of a version. A process that has loaded three linear algebras needs 80."""
+
+
 def _blas() -> str:
     """What the last bits of all numbers depend on: the linear algebra's library, the processor that
     its kernels are for, and its threads."""
@@ -257,7 +262,8 @@ def _blas() -> str:
         for lib in threadpool_info()
         if lib["user_api"] == "blas"
     }
-    return "+".join(sorted(kinds)) or "unknown"
+    named = re.sub(r"[^0-9A-Za-z.+_-]", "_", "+".join(sorted(kinds)))
+    return named[:_LONGEST_VERSION] or "unknown"
 
 
 def _evidence(case: _Case) -> Evidence:
