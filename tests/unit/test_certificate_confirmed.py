@@ -138,14 +138,15 @@ def test_the_file_of_the_readme_s_lines_is_read(tmp_path):
     assert Certificate.verify(path).valid
 
 
-def test_a_process_with_three_linear_algebras_is_certified(baxter):
+def test_a_process_with_three_linear_algebras_is_certified():
     """Each names its kernels and threads: 80 characters that are no reason to refuse."""
+    made = baxter()
     three = "openblas-SkylakeX-2threads+openblas-SkylakeX-1threads+openblas-Zen-1threads"
 
     def named(blas):
-        versions = {**baxter.answer.versions, "blas": blas}
-        return replace(baxter, answer=replace(baxter.answer, versions=versions))
+        versions = {**made.answer.versions, "blas": blas}
+        return replace(made, answer=replace(made.answer, versions=versions))
 
-    assert named(three).confirmed().answer.status is baxter.answer.status
+    assert named(three).confirmed().answer.status is made.answer.status
     with pytest.raises(SolverError, match="versions"):
         named("three of them").confirmed()
