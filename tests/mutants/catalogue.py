@@ -319,8 +319,8 @@ MUTANTS = [
     ),
     *_of(
         "margin", "margin/_delayed.py",
-        ("return Broken.of(loop, first[0] if first else np.eye(len(last)), last)",
-         "return Broken.of(loop, first[0] if first else np.eye(len(last)), 0.5 * last)",
+        ("return loop, Broken.of(loop, *self._sides())",
+         "return loop, Broken.of(loop, *(0.7 * side for side in self._sides()))",
          "what is late"),
         ("            A_e=self.A_e,\n",
          "            A_e=None if self.embedded_delay else self.A_e,\n",

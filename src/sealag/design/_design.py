@@ -45,24 +45,8 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
-    """A robot with its actuators, law and delays, in SI units; `System` answers questions of it.
-
-    Attributes:
-        robot: the robot.
-        actuators: its series elastic actuators.
-        law: the whole-body control law.
-        program: makes the controller that runs instead of the law, which is without effect then;
-            None for the law.
-        posture: (nq,) configuration that the law holds, and that is certified without a motion.
-        delays: both connections' delays, with the period of a controller that runs: the hold of
-            one that states none counts too.
-        contacts: which frames are held when a motion does not say it.
-        name: what messages and files call it.
-        criterion: the criterion that certifies by default.
-        simulation: how it is simulated.
-        walking: a walk; None if there is none.
-        source: the project file that it was read from; None if it was built in Python.
-    """
+    """A robot with its actuators, law and delays, in SI units. `System`, which answers questions of
+    it, says what its fields are."""
 
     robot: Robot
     actuators: Actuators

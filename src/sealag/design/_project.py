@@ -145,7 +145,6 @@ def _system(project: Project, path: Path, text: str) -> System:
         )
     law = _law(project, robot, path)
     law.gain(robot)
-    law.drag(robot)
     actuators = _actuators(project.actuators, robot, path)
     if isinstance(project.controller, JointPdKeys) and project.controller.damping_at == "drive":
         kd = _by_joint(project.controller.kd, robot, path, "controller.kd")

@@ -37,8 +37,7 @@ class DelayedLoop:
     @property
     def A_1(self) -> Array:
         """(n, n) what is late by d, 1/s."""
-        sides = self._sides()
-        return sides[0] if len(sides) == 1 else np.matmul(*sides)
+        return np.matmul(*self._sides())
 
     def margin(
         self,
@@ -117,8 +116,7 @@ class DelayedLoop:
             InputError: matrices do not fit or are not finite real numbers, or a time is negative.
             SolverError: a matrix moves a symmetry, or rounding leaves the norm open.
         """
-        loop = self._prepared()
-        return jitter_margin(loop, self._broken(loop))
+        return jitter_margin(*self._parts())
 
     def sampled_margin(self, period: float) -> SampledMargin:
         """Largest constant delay of the loop sampled and held; docs/theory section 7.6.
@@ -134,7 +132,8 @@ class DelayedLoop:
             InputError: matrices do not fit, the period is no time, or there is an A_e.
             SolverError: a matrix moves a symmetry, or rounding leaves the jitter margin open.
         """
-        return self._held(period).margin(self.jitter_margin().delay)
+        parts = self._parts()
+        return _held(*parts, period=period).margin(jitter_margin(*parts).delay)
 
     def sampled_radius(self, period: float, delay: float) -> float:
         """Spectral radius of ẋ = A_0 x + B u with u = C x(kT) held on kT + d ≤ t < (k + 1) T + d.
@@ -156,7 +155,7 @@ class DelayedLoop:
                 wait than can be lifted.
             SolverError: a matrix moves a symmetry.
         """
-        return self._held(period).radius(time_of("delay", delay))
+        return _held(*self._parts(), period=period).radius(time_of("delay", delay))
 
     def roots(self, delay: float, *, count: int = 1, nodes: int = 24) -> Array:
         """Rightmost roots of det(λ − A_0 − A_1 e^{-λd} − A_e e^{-λe}) = 0.
@@ -182,11 +181,12 @@ class DelayedLoop:
             raise InputError(f"count is {count} and nodes {nodes}; at least 1 and 4 are needed.")
         return loop_roots(self._prepared(), delay, count=count, nodes=nodes)
 
-    def _sides(self) -> tuple[Array, ...]:
-        """B and C, or A_1 alone."""
-        wanted = "a matrix of real numbers"
+    def _sides(self) -> tuple[Array, Array]:
+        """B and C; the identity and A_1 where that is given whole."""
         if self.C is None:
-            return (real_numbers("A_1", self.B, what=wanted),)
+            A_1 = real_square("A_1", self.B)
+            return np.eye(len(A_1)), A_1
+        wanted = "a matrix of real numbers"
         B, C = (real_numbers(name, given, what=wanted)
                 for name, given in (("B", self.B), ("C", self.C)))  # fmt: skip
         size, m = len(real_square("A_0", self.A_0)), len(C)
@@ -198,6 +198,7 @@ class DelayedLoop:
         return B, C
 
     def _prepared(self) -> Loop:
+        """The loop, checked and without its symmetries."""
         return prepare(
             self.A_0,
             self.B if self.C is None else self.A_1,
@@ -206,13 +207,14 @@ class DelayedLoop:
             embedded_delay=self.embedded_delay,
         )
 
-    def _broken(self, loop: Loop) -> Broken:
-        *first, last = self._sides()
-        return Broken.of(loop, first[0] if first else np.eye(len(last)), last)
-
-    def _held(self, period: float) -> Held:
+    def _parts(self) -> tuple[Loop, Broken]:
+        """The loop, and it broken where it is late."""
         loop = self._prepared()
-        if loop.embedded:
-            raise InputError("A sampled loop has one delay; there is an A_e with one of its own.")
-        broken = self._broken(loop)
-        return Held.of(loop.A_0 + loop.A_e, broken.left, broken.right, period=period)
+        return loop, Broken.of(loop, *self._sides())
+
+
+def _held(loop: Loop, broken: Broken, *, period: float) -> Held:
+    """A loop whose command is held for a period."""
+    if loop.embedded:
+        raise InputError("A sampled loop has one delay; there is an A_e with one of its own.")
+    return Held.of(loop.A_0 + loop.A_e, broken.left, broken.right, period=period)

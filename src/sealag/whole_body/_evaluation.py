@@ -92,7 +92,7 @@ class LawEvaluation:
             fed_back=law.gravity is GravityCompensation.FEEDBACK,
         )
         self.planned_gravity, self._measured = gains.planned_gravity, self.running()
-        self._drag = law.drag(robot) if law.damped else None
+        self._drag = law.drag(robot)
         self._kept = keep(self._allocate(frames, tasks, gains))
         self.follow(np.asarray(posture, dtype=float))
         if law.gravity is GravityCompensation.PLANNED:
@@ -247,16 +247,12 @@ class LawEvaluation:
             rates: (n,) measured, rad/s.
             wanted: (m,) ẋ_d; None for 0.
         """
-        if self._drag is None:
-            return np.zeros(self.robot.n)
         J_star = self.space.J_star
         away = -(J_star @ rates) if wanted is None else wanted - J_star @ rates
         return J_star.T @ (self._drag @ away)
 
     def drag_slope(self) -> Array:
         """Return −J*ᵀ D_x J* (n, n), Nms/rad, where the law was last evaluated."""
-        if self._drag is None:
-            return np.zeros((self.robot.n, self.robot.n))
         return -self.space.J_star.T @ self._drag @ self.space.J_star
 
     def leave_to_higher(self, rate: Array) -> None:

@@ -65,9 +65,9 @@ def freeze(
 
     δτ_osc = C_q δq + C_v δv + C_θ δθ + C_θ̇ δθ̇ + C_τ δτ_sea by central differences of `tick`, each
     after the controller has settled at rest. With δτ_sea = K (δθ − δq_j) + D_s (δθ̇ − δq̇_j) and the
-    links, motors and drives of `FrozenLoop` that is a loop with one delay, for
-    `margin` and `jitter_margin`. Any law that is a function of the newest
-    measurement: joint PD, a policy, gravity compensation, a predictor that does not remember.
+    links, motors and drives of `FrozenLoop` that is a loop with one delay, for `margin` and
+    `jitter_margin`. Any law that is a function of the newest measurement: joint PD, a policy,
+    gravity compensation, a predictor that does not remember.
 
     Args:
         controller: whatever has `reset` and `tick`. It is ticked some thousand times, and reset.

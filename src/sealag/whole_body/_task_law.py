@@ -21,18 +21,8 @@ from sealag.whole_body._tasks import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskLaw:
-    """τ_osc = Σ_k J*_{k|prec}ᵀ (S_k x̃_k + D_k x̃̇_k) + ḡ, Eqs. (10)-(17).
-
-    Attributes:
-        tasks: the tasks; those of equal priority share a level, in the order given.
-        gravity: where gravity compensation ḡ takes its configuration from.
-        stiffness_form: how the stiffness S follows from K_x and the task inertia.
-        task_inertia: which task inertia that is.
-        task_error: which error tasks below the first level feed back.
-        velocity_feedforward: whether D_θ θ̇_d of a moving reference is added, so that the embedded
-            damping acts on θ̇ − θ̇_d only.
-        ordered: the tasks by priority.
-    """
+    """τ_osc = Σ_k J*_{k|prec}ᵀ (S_k x̃_k + D_k x̃̇_k) + ḡ, Eqs. (10)-(17). `Law`, which also has the
+    signal, says what its fields are."""
 
     tasks: tuple[Task, ...]
     gravity: GravityCompensation = GravityCompensation.FEEDBACK
