@@ -7,8 +7,10 @@ from humanoids2016._ablation import (
     ablation_table,
     gait_cases,
 )
-from humanoids2016._beyond import HELD_OUT, DelayMap, beyond_cases, delay_map
+from humanoids2016._beyond import HELD_OUT, DelayMap, beyond_cases, delay_map, drive_cases
+from humanoids2016._central_damping import SplitDamping, split_claim, split_damping
 from humanoids2016._claims import Claim, Verdict
+from humanoids2016._concordance import ROWS
 from humanoids2016._figure4 import (
     CertifiedVariant,
     Figure4,
@@ -18,6 +20,8 @@ from humanoids2016._figure4 import (
 )
 from humanoids2016._figure5 import TorqueTrace, figure_5, figure_5_claims, measured_lag
 from humanoids2016._findings import QUICK, Findings, StudySize
+from humanoids2016._levels import LevelTable, level_claim, level_table
+from humanoids2016._live import LiveLeg, live_leg
 from humanoids2016._paper_page import write_paper_page
 from humanoids2016._random_plants import SeaPlant, random_sea_plant
 from humanoids2016._random_table import (
@@ -43,17 +47,21 @@ __all__ = [
     "HELD_OUT",
     "PUBLISHED_LAW",
     "QUICK",
+    "ROWS",
     "AblationTable",
     "CertifiedVariant",
     "Claim",
     "DelayMap",
     "Figure4",
     "Findings",
+    "LevelTable",
+    "LiveLeg",
     "NoisySensors",
     "PlantComparison",
     "RandomPlantTable",
     "SeaPlant",
     "SensorNoise",
+    "SplitDamping",
     "StudySize",
     "TorqueTrace",
     "UnsafeExample",
@@ -68,12 +76,16 @@ __all__ = [
     "compare_plant",
     "delay_map",
     "delayed_margin",
+    "drive_cases",
     "figure_4",
     "figure_4_claims",
     "figure_5",
     "figure_5_claims",
     "gain_cases",
     "gait_cases",
+    "level_claim",
+    "level_table",
+    "live_leg",
     "measured_lag",
     "planned_walk",
     "random_plant_table",
@@ -83,6 +95,8 @@ __all__ = [
     "rough_grounds",
     "simulate_walk",
     "simulated_motion",
+    "split_claim",
+    "split_damping",
     "study",
     "unsafe_examples",
     "walk_claim",

@@ -7,7 +7,7 @@ import numpy as np
 
 from humanoids2016._walk import WalkCase, at_delay_scale, walking_of
 from humanoids2016._walk_table import rough_grounds, walk_success
-from sealag.design import System, load
+from sealag.design import System, certify, load
 from sealag.robot import Motion
 from sealag.simulation import Push
 from sealag.typing import Array
@@ -49,6 +49,41 @@ def beyond_cases(walking: Walking) -> dict[str, WalkCase]:
                 steps=10, ground=GroundProfile.flat()
             )
     return cases
+
+
+FRICTIONS = (0.5, 1.0, 2.0, 4.0)
+"""Coulomb friction of every motor, Nm."""
+
+BANDWIDTHS = (1000.0, 300.0, 100.0)
+"""Bandwidths of every motor's torque loop, rad/s."""
+
+
+def drive_cases(walking: Walking) -> dict[str, WalkCase]:
+    """Return walks on drives that are not ideal, of which the controller knows nothing.
+
+    Args:
+        walking: The walk.
+    """
+    case = WalkCase(walking=walking)
+    cases = {"ideal drives": case}
+    for friction in FRICTIONS:
+        name = f"Coulomb friction {friction:g} Nm at every motor"
+        cases[name] = replace(case, coulomb_friction=friction)
+    for bandwidth in BANDWIDTHS:
+        name = f"torque bandwidth {bandwidth:g} rad/s at every motor"
+        cases[name] = replace(case, torque_bandwidth=bandwidth)
+    return cases
+
+
+def bandwidth_refusal(system: System) -> str:
+    """Return why a finite torque bandwidth is not certified.
+
+    Args:
+        system: the project.
+    """
+    lags = np.full(system.actuators.n, BANDWIDTHS[0])
+    lagging = replace(system, actuators=replace(system.actuators, torque_bandwidth=lags))
+    return "; ".join(certify(lagging).answer.reasons)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

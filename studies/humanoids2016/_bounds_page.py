@@ -41,9 +41,10 @@ def limits_section(found: Findings) -> Section:
         title="Bounds and what walks",
         blocks=[
             Table(
+                title="Smallest bounds over the walk",
                 columns=["Smallest bound at α = 1 (ms)", "planned walk", "simulated walk"],
                 rows=bounds,
-                caption="In the simulated walk the foot that carries more load counts as stance.",
+                note="In the simulated walk the foot that carries more load counts as stance.",
             ),
             Figure(
                 svg=plot_figure_4(simulated),
@@ -68,6 +69,7 @@ def limits_section(found: Findings) -> Section:
                 "which one more pair of roots becomes unstable.",
             ),
             Table(
+                title="Walked and certified delays over spring stiffness",
                 columns=[
                     "K (Nm/rad)", "a gait up to (ms)", "walked up to (ms)",
                     "certified, motor (ms)", "certified, q̄(θ) (ms)", "next crossing (ms)",
@@ -80,10 +82,9 @@ def limits_section(found: Findings) -> Section:
                         strict=True,
                     )
                 ],
-                caption="Largest d_1 up to which every ground was walked.",
+                note="Largest d_1 up to which every ground was walked.",
             ),
-            Text(text="Over spring stiffness, α and β at the paper's delays:"),
-            rows_table(found.gains),
+            rows_table(found.gains, "Spring stiffness, α and β at the paper's delays"),
         ],
     )  # fmt: skip
 
@@ -128,12 +129,13 @@ def figure_5_section(found: Findings) -> Section:
                 "(thin) and Γ_sea (thick) for the smallest and largest β.",
             ),
             Table(
+                title="Deviation and lag of the spring torque",
                 columns=[
                     "K (Nm/rad)", "α", "β", *(f"{name} (Nm)" for name in joints[:3]),
                     "τ_osc − Γ_sea (Nm)", "command late (ms)", "Γ_sea late (ms)", "walk",
                 ],
                 rows=rows,
-                caption="RMS of Γ_osc − Γ_sea for one leg's joints; mean RMS over all joints with "
+                note="RMS of Γ_osc − Γ_sea for one leg's joints; mean RMS over all joints with "
                 "the feedforward left in; measured lags of the acting command and of Γ_sea behind "
                 f"what was sent, beside a mean (T_H + T_L)/2 of {channel * 1e3:.1f} ms.",
             ),
@@ -162,8 +164,16 @@ def beyond_section(found: Findings) -> Section:
         anchor="beyond",
         title="Beyond the paper",
         blocks=[
-            rows_table(found.beyond),
+            rows_table(found.beyond, "Stairs, rougher ground, pushes"),
+            rows_table(found.drives, "Drives that are not ideal"),
+            Text(
+                text=(
+                    "Coulomb friction only dissipates, so that the certified bound stays as it is. "
+                    "A finite torque bandwidth is not certified: " + found.bandwidth_refusal
+                )
+            ),
             Table(
+                title="The paper's future work",
                 columns=["Future work", "Here"],
                 rows=[
                     [
@@ -176,15 +186,31 @@ def beyond_section(found: Findings) -> Section:
                         f"({feedback} feedback).",
                     ],
                     [
-                        "(ii) to (iv)",
-                        "The paper's wording of these was not at hand when this page was written, "
-                        "so none is claimed as done. What goes beyond the paper here: criteria "
-                        "for each signal that may be fed back, the exact local margin, delays "
-                        "with jitter and loss, contacts with impact and friction, wrong models "
-                        "and noisy sensors, and a closed-loop walk.",
+                        "(ii) asymmetric delays in feedforward and feedback",
+                        "Each way has its own delay, jitter and loss in the project file. The "
+                        "criterion depends on their sum d_1; the command's way alone is what the "
+                        "walk predicts over.",
+                    ],
+                    [
+                        "(iii) optimal central controller; central against embedded damping",
+                        _central(found),
+                    ],
+                    [
+                        "(iv) experiments; Coulomb friction and torque bandwidth",
+                        "Both in the simulated walk, table above. No experiment on hardware.",
                     ],
                 ],
                 stack=True,
             ),
         ],
+    )
+
+
+def _central(found: Findings) -> str:
+    """What it costs to compute the damping centrally."""
+    whole = [row for row in found.damping if row.share == max(r.share for r in found.damping)]
+    each = ", ".join(f"{row.joint} {row.constant_s * 1e3:.2f} ms" for row in whole)
+    return (
+        f"With all damping central the exact margin of a held joint is {each} (claim “central "
+        "damping”). An optimal controller is not designed here."
     )

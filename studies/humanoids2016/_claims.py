@@ -6,11 +6,12 @@ from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """How a computed value stands to a published statement."""
+    """How a computed value, or a proof, stands to a published statement."""
 
     CONFIRMED = "confirmed"
     QUALIFIED = "qualified"
     CONTRADICTED = "contradicted"
+    PROVEN = "proven"
 
     @classmethod
     def of(cls, cases: Iterable[object]) -> "Verdict":
@@ -24,6 +25,15 @@ class Verdict(StrEnum):
         if not held or (any(held) and not all(held)):
             return cls.QUALIFIED
         return cls.CONFIRMED if held[0] else cls.CONTRADICTED
+
+    @classmethod
+    def theorem(cls, cases: Iterable[object]) -> "Verdict":
+        """Judge a statement that has a proof: the numbers only show that the code agrees.
+
+        Args:
+            cases: for each whether the statement held; one that did not is an error somewhere.
+        """
+        return cls.PROVEN if all(cases) else cls.CONTRADICTED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,9 +4,12 @@ from dataclasses import dataclass
 
 from humanoids2016._ablation import AblationTable
 from humanoids2016._beyond import SCALES, STIFFNESSES, DelayMap
+from humanoids2016._central_damping import SplitDamping
 from humanoids2016._claims import Claim
 from humanoids2016._figure4 import Figure4
 from humanoids2016._figure5 import BETAS, TorqueTrace
+from humanoids2016._levels import LevelTable
+from humanoids2016._live import LiveLeg
 from humanoids2016._random_table import RandomPlantTable
 from humanoids2016._unsafe import UnsafeExample
 from humanoids2016._walk import Walk
@@ -83,6 +86,11 @@ class Findings:
         delays: how much delay is walked, beside the bounds.
         traces: the walks of Fig. 5.
         beyond: stairs, pushes and rougher ground.
+        drives: Coulomb friction and torque bandwidth, which the controller does not know.
+        bandwidth_refusal: why a finite torque bandwidth is not certified.
+        levels: one priority level against two.
+        damping: damping in the drive against damping in the controller.
+        live: matrices for the reader's own gains.
         certificate: over the planned walk, with the bound for matrices that vary in time.
         claims: statements of the paper, checked.
     """
@@ -103,5 +111,10 @@ class Findings:
     delays: DelayMap
     traces: tuple[TorqueTrace, ...]
     beyond: tuple[WalkRow, ...]
+    drives: tuple[WalkRow, ...]
+    bandwidth_refusal: str
+    levels: LevelTable
+    damping: tuple[SplitDamping, ...]
+    live: LiveLeg
     certificate: Certificate
     claims: tuple[Claim, ...]

@@ -10,6 +10,7 @@ import numpy as np
 from humanoids2016._beyond import DelayMap
 from humanoids2016._figure4 import Figure4
 from humanoids2016._figure5 import TorqueTrace
+from humanoids2016._levels import LevelTable
 from humanoids2016._walk import Walk
 from sealag.whole_body import StaticJoint, StiffnessForm
 
@@ -57,7 +58,7 @@ def plot_figure_4(figure: Figure4) -> str:
             )  # fmt: skip
         static = _variant(figure, StaticJoint.name)
         axes.plot(
-            figure.alpha, figure.alpha * static * 1e3, "--", color="#444",
+            figure.alpha, figure.alpha * static * 1e3, "--", color="#777",
             label="certified, q̄(θ) fed back, D_θ[0] = 10",
         )  # fmt: skip
         axes.set_xlabel("α, factor on the motor damping D_θ")
@@ -99,7 +100,7 @@ def plot_walk_bounds(figure: Figure4) -> str:
             if v.signal == StaticJoint.name and v.form is StiffnessForm.SYMMETRIC
         )
         axes.plot(
-            figure.time[pick], static[pick] * 1e3, "--", color="#444", lw=1.2,
+            figure.time[pick], static[pick] * 1e3, "--", color="#777", lw=1.2,
             label="certified, q̄(θ), D_θ[0] = 10",
         )  # fmt: skip
         axes.set_xlabel("time along the planned walk (s)")
@@ -107,6 +108,29 @@ def plot_walk_bounds(figure: Figure4) -> str:
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.25)
         axes.legend(frameon=False, fontsize=10, ncols=2)
+        return _svg(drawing)
+
+
+def plot_levels(levels: LevelTable) -> str:
+    """Draw the bounds of both orders of two levels over the bound of one level.
+
+    Args:
+        levels: bounds along a walk.
+
+    Returns:
+        SVG markup.
+    """
+    with _drawing(7.2, 3.4) as (drawing, axes):
+        for colour, mark, one in zip(COLOURS, ("-o", "--s"), levels.levels, strict=False):
+            axes.plot(
+                levels.time, one.delay_s / levels.single, mark, ms=3.0, color=colour, lw=1.0,
+                label=one.name,
+            )  # fmt: skip
+        axes.axhline(1.0, color="#000", lw=0.8)
+        axes.set_xlabel("time along the planned walk (s)")
+        axes.set_ylabel("two levels / one level")
+        axes.grid(alpha=0.25)
+        drawing.legend(frameon=False, fontsize=10, ncols=2, loc="outside upper center")
         return _svg(drawing)
 
 

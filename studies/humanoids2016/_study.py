@@ -6,10 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from humanoids2016._ablation import PUBLISHED_LAW, ablation_cases, ablation_table, gait_cases
-from humanoids2016._beyond import HELD_OUT, beyond_cases, delay_map
+from humanoids2016._beyond import (
+    HELD_OUT,
+    bandwidth_refusal,
+    beyond_cases,
+    delay_map,
+    drive_cases,
+)
+from humanoids2016._central_damping import split_claim, split_damping
 from humanoids2016._figure4 import LEG, figure_4, figure_4_claims, simulated_motion
 from humanoids2016._figure5 import figure_5, figure_5_claims
 from humanoids2016._findings import QUICK, Findings, StudySize
+from humanoids2016._levels import level_claim, level_table
+from humanoids2016._live import live_leg
 from humanoids2016._paper_page import write_paper_page
 from humanoids2016._random_table import random_plant_table
 from humanoids2016._unsafe import unsafe_examples
@@ -129,6 +138,7 @@ def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> 
     traces = figure_5(betas=size.betas, project=project, jobs=size.jobs)
     published = next(row for row in ablations if row.name == PUBLISHED_LAW)
     few = (size.few_grounds + 1) // 2
+    levels, damping = level_table(system, motion), split_damping(system)
     return Findings(
         system=system,
         motion=motion,
@@ -157,10 +167,17 @@ def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> 
         beyond=walk_success(
             _some(beyond_cases(walking), size), None, project=project, jobs=size.jobs
         ),
+        drives=tabulate(drive_cases(walking), size.few_grounds, HELD_OUT),
+        bandwidth_refusal=bandwidth_refusal(system),
+        levels=levels,
+        damping=damping,
+        live=live_leg(system, motion),
         certificate=certify(system, motion, time_varying=True),
         claims=(
             *figure_4_claims(figure, table),
             *figure_5_claims(traces),
+            level_claim(levels),
+            split_claim(damping),
             walk_claim(robust, published),
         ),
     )

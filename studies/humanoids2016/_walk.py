@@ -59,6 +59,8 @@ class WalkCase:
             springs against what the controller believes.
         pushes: disturbing forces.
         seed: of noise and model errors.
+        coulomb_friction: of every motor, Nm, which the controller does not know.
+        torque_bandwidth: of every motor's current loop, rad/s, which it does not know either.
         physics: step of the plant, s.
         embedded: period at which the drives look for commands, s; 0 for at once.
     """
@@ -72,6 +74,8 @@ class WalkCase:
     model_error: float = 0.0
     pushes: Sequence[Push] = ()
     seed: int = 0
+    coulomb_friction: float = 0.0
+    torque_bandwidth: float = np.inf
     physics: float = 1e-3
     embedded: float = 0.0
 
@@ -145,6 +149,11 @@ def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:
     if case.model_error > 0.0:
         plant = wrong_robot(robot, error=case.model_error, seed=case.seed)
         springs = wrong_springs(believed, error=case.model_error, seed=case.seed)
+    springs = replace(
+        springs,
+        coulomb_friction=springs.coulomb_friction + case.coulomb_friction,
+        torque_bandwidth=np.minimum(springs.torque_bandwidth, case.torque_bandwidth),
+    )
     seen: TickController = start.controller
     if case.noise is not None:
         seen = NoisySensors(seen, robot, noise=case.noise, seed=case.seed)

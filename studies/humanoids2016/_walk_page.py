@@ -12,7 +12,7 @@ from humanoids2016._plots import plot_gait
 from humanoids2016._walk import Walk
 from humanoids2016._walk_table import WalkRow
 from sealag.delay import RoundTrip
-from sealag.robot import Robot
+from sealag.design import System
 from sealag.typing import Array
 
 FRAMES_PER_SECOND = 30.0
@@ -46,9 +46,9 @@ def walk_section(found: Findings) -> Section:
                 )
             ),
             Raw(
-                html=playback(system.robot, walk),
-                caption="Drag to turn. Right leg blue, left leg orange; a ring marks a foot on the "
-                "ground.",
+                html=playback(system, walk),
+                caption="Drag to turn; move over the curves to see an instant. Right leg blue, "
+                "left leg orange and dashed; a ring marks a foot on the ground.",
             ),
             Figure(
                 svg=plot_gait(walk),
@@ -62,14 +62,14 @@ def walk_section(found: Findings) -> Section:
                     "second step."
                 )
             ),
-            rows_table(found.robust),
+            rows_table(found.robust, "Success with sensor and model errors"),
             Text(
                 text=(
                     "Gains and gait were tuned on some of these terrains. On held-out terrains, "
                     f"{held_out[0].steps} steps each:"
                 )
             ),
-            rows_table(held_out),
+            rows_table(held_out, "The same on held-out terrains"),
         ],
     )
 
@@ -134,12 +134,13 @@ def means_section(found: Findings) -> Section:
                     "left out at a time:"
                 )
             ),
-            rows_table(ablations),
+            rows_table(ablations, "One element left out"),
             Text(text=_why_it_falls(found)),
             Table(
+                title="Each element left out, over springs, α, β and delays",
                 columns=["Left out", *everywhere.conditions],
                 rows=cells,
-                caption=f"Walks without a fall / gaits, of {everywhere.terrains} rough grounds "
+                note=f"Walks without a fall / gaits, of {everywhere.terrains} rough grounds "
                 "each; K in Nm/rad, 350 unless given.",
             ),
             Text(
@@ -152,7 +153,7 @@ def means_section(found: Findings) -> Section:
                     "legs. Each error alone displaces the footstep:"
                 )
             ),
-            rows_table(gait),
+            rows_table(gait, "What makes the walk a gait"),
         ],
     )
 
@@ -196,9 +197,11 @@ def energy_section(found: Findings) -> Section:
         title="Energy of the walk",
         blocks=[
             Table(
+                title="Energy over the walk",
                 columns=["Energy", "J"],
                 rows=rows,
-                caption=f"First law closed to {audit.closure:.1e} of the throughput.",
+                open=True,
+                note=f"First law closed to {audit.closure:.1e} of the throughput.",
             ),
             Text(
                 text=(
@@ -216,17 +219,19 @@ def energy_section(found: Findings) -> Section:
     )
 
 
-def rows_table(rows: Sequence[WalkRow]) -> Table:
+def rows_table(rows: Sequence[WalkRow], title: str) -> Table:
     """Tabulate success over terrains.
 
     Args:
         rows: one for each case.
+        title: what was varied.
     """
 
     def percent(value: float) -> Cell:
         return Cell(text=f"{value:.0%}" if np.isfinite(value) else "–", css="number")
 
     return Table(
+        title=title,
         columns=["Case", "walked", "gaits", "speed off by", "width off by", "mean steps", "falls"],
         rows=[
             [
@@ -240,21 +245,25 @@ def rows_table(rows: Sequence[WalkRow]) -> Table:
             ]
             for row in rows
         ],
-        caption="Largest deviations over the walks that did not fall; the first fall's cause.",
+        note="Largest deviations over the walks that did not fall; the first fall's cause.",
     )
 
 
-def playback(robot: Robot, walk: Walk) -> str:
+def playback(system: System, walk: Walk) -> str:
     """Return markup and script that play a walk in 3-D, without any library.
 
     Args:
-        robot: Hume.
+        system: Hume and its delays.
         walk: the walk.
     """
     import jinja2
     from markupsafe import Markup
 
-    run = walk.run
+    run, robot = walk.run, system.robot
+    sides = ("left", "right")
+    knees = [run.joints.index(f"{side}_knee") for side in sides]
+    feet = [list(run.feet).index(f"{side}_foot") for side in sides]
+    delay = system.delays.central.at(run.time) + 0.5 * system.delays.embedded.at(run.time)
     stride = max(1, round(1.0 / FRAMES_PER_SECOND / float(run.time[1] - run.time[0])))
     frames = []
     for k in range(0, len(run.time), stride):
@@ -264,7 +273,7 @@ def playback(robot: Robot, walk: Walk) -> str:
                 [round(float(v), 3) for v in at.frame_placement(f"{side}_{part}")[1]]
                 for part in ("abduct", "thigh", "shank", "foot")
             ]
-            for side in ("left", "right")
+            for side in sides
         }
         rotation, base = at.frame_placement("torso")
         head = base + 0.4 * rotation[:, 2]
@@ -273,10 +282,10 @@ def playback(robot: Robot, walk: Walk) -> str:
                 "t": round(float(run.time[k]), 3),
                 "base": [round(float(v), 3) for v in base],
                 "head": [round(float(v), 3) for v in head],
-                "down": [
-                    int(run.contact_mode[k, list(run.feet).index(f"{side}_foot")] > 0)
-                    for side in ("left", "right")
-                ],
+                "down": [int(run.contact_mode[k, foot] > 0) for foot in feet],
+                "torque": [round(float(run.tau_sea[k, knee]), 1) for knee in knees],
+                "force": [round(float(run.contact_force[k, foot, 2]), 1) for foot in feet],
+                "delay": round(1e3 * float(delay[k]), 2),
                 **{side: [[round(float(v), 3) for v in base], *leg] for side, leg in legs.items()},
             }
         )

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from contextlib import contextmanager
 from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
@@ -12,13 +13,14 @@ import pytest
 from humanoids2016 import (
     QUICK,
     AblationTable,
-    DelayMap,
+    delayed_margin,
     planned_walk,
     simulate_walk,
     study,
     write_paper_page,
 )
 from sealag.design import load
+from sealag.passivity import Instant, Problem, max_delay, solve
 
 pytestmark = pytest.mark.slow
 
@@ -26,15 +28,17 @@ pytestmark = pytest.mark.slow
 class Links(HTMLParser):
     def __init__(self):
         super().__init__()
-        self.outside, self.anchors, self.ids = [], [], set()
+        self.outside, self.anchors, self.tables, self.ids = [], [], [], []
 
     def handle_starttag(self, tag, attrs):
         found = dict(attrs)
-        self.ids.add(found.get("id"))
+        self.ids += [found["id"]] if "id" in found else []
         for key in ("src", "href"):
             target = found.get(key) or ""
             if target.startswith("#"):
                 self.anchors.append(target[1:])
+            elif target.startswith("tables/"):
+                self.tables.append(target)
             elif target and tag != "use":
                 self.outside.append(target)
 
@@ -77,10 +81,13 @@ def test_page_needs_no_network_and_holds_the_numbers(written):
     links.feed(text)
     assert links.outside == []
     assert set(links.anchors) >= {
-        "claims", "figure4", "certified", "unsafe", "walk", "means", "energy", "limits", "figure5",
-        "beyond",
+        "claims", "loop", "criteria", "live", "figure4", "certified", "levels", "unsafe", "walk",
+        "means", "energy", "limits", "figure5", "beyond", "assumptions", "rows",
     }  # fmt: skip
-    assert set(links.anchors) - {a for a in links.anchors if a.startswith(("m", "p"))} <= links.ids
+    assert set(links.anchors) <= set(links.ids)
+    assert len(links.ids) == len(set(links.ids))
+    assert len(links.tables) == text.count("<table")
+    assert all((out / target).is_file() for target in links.tables)
     assert 'name="viewport"' in text
     assert not re.search(r"https?://(?!www\.w3\.org|purl\.org|creativecommons|matplotlib)", text)
     assert text.count("<svg") >= 3
@@ -123,40 +130,118 @@ def test_the_page_shows_the_projects_own_walk(written):
 
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+in_browser = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium on this machine; .ci/run installs one"
+)
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; .ci/run installs one")
-@pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)], ids=["desktop", "phone"])
-def test_page_in_a_browser(written, width, height):
+@contextmanager
+def opened(written, width=1280, height=900, scheme="light", motion="no-preference"):
+    """The page in a browser; what the browser complains about fails the test."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play:
         browser = play.chromium.launch(
             executable_path=BROWSER, args=["--no-sandbox", "--disable-background-networking"]
         )
-        page = browser.new_page(viewport={"width": width, "height": height})
+        page = browser.new_page(
+            viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion=motion
+        )
         problems = []
         page.on("pageerror", lambda error: problems.append(str(error)))
         page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
         page.goto(written.page.as_uri())
-        picture = "document.querySelector('canvas').toDataURL()"
-        first = page.evaluate(picture)
-        page.wait_for_function(f"{picture} !== '{first}'", timeout=10_000)  # the walk is playing
+        yield page
         assert problems == []
+        browser.close()
+
+
+PICTURE = "document.querySelector('canvas').toDataURL()"
+
+
+@in_browser
+@pytest.mark.parametrize(("width", "height"), [(1400, 900), (820, 1100), (390, 844)])
+def test_page_in_a_browser(written, width, height):
+    with opened(written, width, height) as page:
+        first = page.evaluate(PICTURE)
+        page.wait_for_function(f"{PICTURE} !== '{first}'", timeout=10_000)  # the walk is playing
         overflow = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
         assert page.evaluate(overflow) <= 0
         page.evaluate("document.querySelector('h1').style.width = '200vw'")
         assert page.evaluate(overflow) > 0  # and a page that is too wide is noticed
-        browser.close()
 
 
-def test_the_longest_delay_ends_at_the_first_fall():
-    """Walking again beyond a fall does not count."""
-    two = np.array([0.1, 0.2, 0.3, 0.4])
-    delays = DelayMap(
-        stiffness=np.array([1.0, 2.0]), scale=two, d_1=two, terrains=2,
-        walked=np.array([[2, 2, 1, 2], [2, 2, 2, 2]]), gaits=np.array([[0, 2, 2, 2], [2, 2, 0, 0]]),
-        certified_motor=two[:2], certified_static=two[:2], first_crossing=two[:2],
-    )  # fmt: skip
-    assert delays.longest_walked.tolist() == [0.2, 0.4]
-    assert delays.longest_gait.tolist() == [0.0, 0.2]
+@in_browser
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_accessibility_checker_finds_nothing_serious(written, scheme):
+    from axe_playwright_python.sync_playwright import Axe
+
+    def serious(page):
+        found = Axe().run(page).response["violations"]
+        return {v["id"] for v in found if v["impact"] in ("serious", "critical")}
+
+    with opened(written, scheme=scheme) as page:
+        page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+        assert serious(page) == set()
+        page.evaluate(
+            "document.querySelectorAll('label').forEach(l => l.replaceWith(...l.children))"
+        )
+        assert "label" in serious(page)  # sliders without a name are noticed
+
+
+@in_browser
+def test_reader_who_wants_no_motion_gets_none_and_has_the_keyboard(written):
+    with opened(written, motion="reduce") as page:
+        first = page.evaluate(PICTURE)
+        page.wait_for_timeout(400)
+        assert page.evaluate(PICTURE) == first
+        page.focus(".playback canvas")
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate(PICTURE) != first
+        assert "ms" in page.inner_text(".playback .readout")
+
+
+@in_browser
+def test_browser_computes_what_sealag_computes(written):
+    """The page's own bounds and margin, all over its sliders, against the library's."""
+    leg, rng = written.found.live, np.random.default_rng(20161115)
+    with opened(written) as page:
+        for case in range(12):
+            choice = {
+                "alpha": float(rng.uniform(0.25, 5.0)), "damping": float(rng.uniform(5.0, 20.0)),
+                "position": float(rng.uniform(10.0, 400.0)),
+                "orientation": float(rng.uniform(5.0, 400.0)),
+                "spring": float(10.0 ** rng.uniform(2.0, 3.7)),
+                "beta": float(rng.uniform(0.1, 2.0)),
+                "instant": int(rng.integers(len(leg.time))),
+            }  # fmt: skip
+            theirs = page.evaluate("choice => sealagLive.bounds(choice)", choice)
+            expected = library_bounds(leg, choice)
+            for name, value in expected.items():
+                if value is None:
+                    assert theirs[name] is None, (case, name)
+                else:
+                    assert theirs[name] == pytest.approx(value, rel=1e-6), (case, name, choice)
+
+
+def library_bounds(leg, choice):
+    k = choice["instant"]
+    J, Lambda = leg.J_star[k], leg.Lambda[k]
+    K_x = np.repeat([choice["position"], choice["orientation"]], 3)
+    D = choice["alpha"] * np.append(choice["damping"], leg.motor_damping[1:])
+    values, V = np.linalg.eigh(Lambda)
+    root = (V * np.sqrt(np.clip(values, 0.0, None))) @ V.T
+    F = J.T @ root @ np.diag(K_x) @ root @ J
+    K = np.full(3, choice["spring"])
+    static = None
+    if np.linalg.eigvalsh(F)[-1] < choice["spring"]:
+        K_theta = F @ np.linalg.inv(np.eye(3) - F / choice["spring"])
+        problem = Problem.of_stiffness((K_theta + K_theta.T) / 2.0, D)
+        static = float(solve(problem, share=Instant(tolerance=1e-9)).delay)
+    margin = delayed_margin(leg.mass[k], K, choice["beta"] * leg.rotor_inertia, D=D, F=F)
+    return {
+        "published": float(max_delay(J, Lambda, K_x, D, form="published", tolerance=1e-9).delay),
+        "certified": float(max_delay(J, Lambda, K_x, D, tolerance=1e-9).delay),
+        "certifiedStatic": static,
+        "margin": margin.delay,
+    }

@@ -1,0 +1,102 @@
+"""The stance leg's matrices along the walk, for bounds that the reader's browser computes."""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+
+from humanoids2016._figure4 import ABDUCTION_DAMPING, ALPHA, LEG, stance_leg
+from sealag.design import System
+from sealag.robot import Motion
+from sealag.typing import Array
+
+LIVE_INSTANTS = 40
+"""Instants of the walk that the page carries."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveLeg:
+    """One leg at some instants of the walk, as the paper takes it.
+
+    Attributes:
+        time: (N,) s.
+        J_star: (N, 6, 3) columns of the stance leg.
+        Lambda: (N, 6, 6) task inertia.
+        mass: (N, 3, 3) mass matrix of the stance leg with the torso held, kg m².
+        rotor_inertia: (3,) B, kg m².
+        motor_damping: (3,) D_θ, Nms/rad.
+        spring_stiffness: (3,) K, Nm/rad.
+        gains: (6,) K_x, 1/s².
+        inertia_shaping: β.
+        delay: largest delay d_1 of the design, s.
+    """
+
+    time: Array
+    J_star: Array
+    Lambda: Array
+    mass: Array
+    rotor_inertia: Array
+    motor_damping: Array
+    spring_stiffness: Array
+    gains: Array
+    inertia_shaping: float
+    delay: float
+
+    def markup(self) -> str:
+        """Return sliders, answers and the script behind them."""
+        import jinja2
+        from markupsafe import Markup
+
+        values, V = np.linalg.eigh(self.Lambda)
+        root = (V * np.sqrt(np.clip(values, 0.0, None))[:, None, :]) @ np.swapaxes(V, 1, 2)
+        data = {
+            "time": self.time.tolist(),
+            "J": self.J_star.tolist(),
+            "LJ": (self.Lambda @ self.J_star).tolist(),
+            "RJ": (root @ self.J_star).tolist(),
+            "M": self.mass.tolist(),
+            "B": self.rotor_inertia.tolist(),
+            "D": self.motor_damping.tolist(),
+        }
+        environment = jinja2.Environment(
+            loader=jinja2.PackageLoader("humanoids2016"), autoescape=True
+        )
+        return environment.get_template("live.html").render(
+            data=Markup(json.dumps(data, separators=(",", ":"))),
+            leg=self,
+            last=len(self.time) - 1,
+            alpha=ALPHA,
+            abduction=ABDUCTION_DAMPING,
+        )
+
+
+def live_leg(system: System, motion: Motion) -> LiveLeg:
+    """Collect the stance leg's matrices.
+
+    Args:
+        system: Hume with the paper's gains.
+        motion: the planned walk.
+    """
+    pick = np.unique(np.linspace(0, len(motion) - 1, LIVE_INSTANTS).astype(int))
+    spaces = system.spaces(motion)
+    robot, drives = system.robot, system.actuators
+    leg = stance_leg(robot, motion, spaces)[pick]
+    own = [robot.joints.index(f"right_{part}") for part in LEG]
+    mass = []
+    for k in pick.tolist():
+        side = motion.contact_sets[int(motion.contact_index[k])][0].frame.removesuffix("_foot")
+        at = [robot.joints.index(f"{side}_{part}") for part in LEG]
+        M = robot.workspace_at(motion.q[k]).M[-robot.n :, -robot.n :]
+        mass.append(M[np.ix_(at, at)].copy())
+    return LiveLeg(
+        time=motion.time[pick],
+        J_star=leg,
+        Lambda=spaces.Lambda[pick],
+        mass=np.array(mass),
+        rotor_inertia=drives.rotor_inertia[own],
+        motor_damping=drives.motor_damping[own],
+        spring_stiffness=drives.spring_stiffness[own],
+        gains=np.diag(spaces.K_x).copy(),
+        inertia_shaping=float(drives.shaped_inertia[own[0]] / drives.rotor_inertia[own[0]]),
+        delay=system.delays.d_1,
+    )
