@@ -10,7 +10,7 @@ from sealag.design import System
 from sealag.passivity import max_delay
 from sealag.robot import Contact, Motion, Robot
 from sealag.simulation import Run
-from sealag.typing import Array
+from sealag.typing import Array, BoolArray
 from sealag.whole_body import (
     GravityCompensation,
     MotorAngles,
@@ -74,6 +74,7 @@ class Figure4:
 
     Attributes:
         time: (N,) s, the instants of the walk.
+        both_feet: (N,) whether two feet stand.
         alpha: (A,) factors on D_θ.
         abduction_damping: (3,) values of D_θ[0], Nms/rad.
         delay_s: (3, A) smallest bound of (29) over the walk, with the paper's one-leg matrices:
@@ -87,6 +88,7 @@ class Figure4:
     """
 
     time: Array
+    both_feet: BoolArray
     alpha: Array
     abduction_damping: Array
     delay_s: Array
@@ -103,7 +105,7 @@ def figure_4(system: System, motion: Motion) -> Figure4:
 
     Args:
         system: Hume with the paper's gains.
-        motion: the planned (or simulated) walk, one foot standing at a time.
+        motion: the planned (or simulated) walk; the first contact is the leg that carries more.
 
     Returns:
         Bounds of the published criterion over α and D_θ[0], and of the certified one.
@@ -143,6 +145,7 @@ def figure_4(system: System, motion: Motion) -> Figure4:
     ]
     return Figure4(
         time=motion.time,
+        both_feet=np.array([len(feet) > 1 for feet in motion.contact_sets])[motion.contact_index],
         alpha=alpha,
         abduction_damping=first,
         delay_s=worst,
@@ -160,7 +163,7 @@ def stance_leg(robot: Robot, motion: Motion, spaces: Spaces) -> Array:
 
     Args:
         robot: Hume.
-        motion: a walk, one foot standing at a time.
+        motion: a walk; the first contact is the leg that carries more.
         spaces: the law's matrices along it.
     """
     leg = np.zeros((len(spaces), spaces.J_star.shape[1], len(LEG)))
@@ -262,9 +265,10 @@ def figure_4_claims(figure: Figure4, table: RandomPlantTable) -> tuple[Claim, ..
             source="Section IV, Theorem 1",
             published="The inequality (29) is sufficient for the passivity of the delayed loop.",
             computed=(
-                f"Of {table.plants} random plants (29) allows {table.published_longer} a delay at "
-                "which the exact loop is unstable, the certified criterion "
-                f"{table.certified_longer}. Of {len(figure.certified)} ways to run the same gains "
+                f"Of {table.presupposed} random plants under the paper's law (29) allows "
+                f"{table.published_longer} a delay at which the exact loop is unstable, the "
+                f"certified criterion {table.certified_longer} of all {table.plants}. Of "
+                f"{len(figure.certified)} ways to run the same gains "
                 f"on Hume it refuses {len(refused)}: {'; '.join(refused)}."
             ),
             verdict=_sufficient(table),
@@ -282,28 +286,31 @@ def _sufficient(table: RandomPlantTable) -> Verdict:
 
 
 def simulated_motion(run: Run) -> Motion:
-    """Turn a simulated biped walk into a motion with one stance foot at each instant.
+    """Turn a simulated biped walk into a motion with the feet that carry it at each instant.
 
-    The stance foot is the one that carries more load; in flight the last one stays. Double
-    support, a sixth of the walk, is thus counted for the foot that carries it.
+    Both feet stand where both carry; the first of a set is the one that carries more. In flight
+    the last ones stay.
 
     Args:
         run: the simulated walk.
     """
-    load = np.array(
-        [
-            run.contact_force[:, np.array(run.feet) == frame, 2].sum(axis=1)
-            for frame in dict.fromkeys(run.feet)
-        ]
-    )
     frames = tuple(dict.fromkeys(run.feet))
-    index = np.argmax(load, axis=0)
-    for k in np.flatnonzero(load.max(axis=0) <= 0.0):
-        index[k] = index[k - 1]
+    load = np.array(
+        [run.contact_force[:, np.array(run.feet) == frame, 2].sum(axis=1) for frame in frames]
+    )
+    sets: dict[tuple[str, ...], int] = {}
+    index = np.zeros(len(run.time), dtype=np.int64)
+    for k, forces in enumerate(load.T):
+        order = np.argsort(-forces, kind="stable")
+        standing = tuple(frames[foot] for foot in order if forces[foot] > 0.0)
+        if not standing:
+            index[k] = index[k - 1] if k else sets.setdefault(frames, len(sets))
+            continue
+        index[k] = sets.setdefault(standing, len(sets))
     return Motion(
         time=run.time,
         q=run.q,
         v=run.v,
-        contact_sets=tuple((Contact(frame=frame),) for frame in frames),
-        contact_index=index.astype(np.int64),
+        contact_sets=tuple(tuple(Contact(frame=frame) for frame in feet) for feet in sets),
+        contact_index=index,
     )

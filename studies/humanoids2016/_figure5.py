@@ -1,7 +1,7 @@
 """Fig. 5: commanded and achieved torque during the walk, for several β."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ BETAS = (0.1, 0.5, 1.0, 2.0)
 DAMPING_SCALES = (0.3, 1.0)
 STIFFNESSES = (350.0, 1000.0)
 LAG_TOLERANCE = 4e-3  # s
+STEPS = 14
+"""Steps of the walks, at least: T_H = 20 + 10 sin t ms passes both its extremes within 4.7 s."""
 VISIBLE = 1.25  # ratio of RMS deviations from which the effect of β counts as visible
 
 
@@ -27,6 +29,7 @@ class TorqueTrace:
         damping_scale: factor on D_θ.
         stiffness: K of all joints, Nm/rad.
         walk: the walk.
+        sent: (N, n) task torque of the tick at each logged instant, as it is sent, Nm.
         command: (N, n) task torque whose command acts at each logged instant, Nm: τ_osc as the
             tasks ask for it, delayed, before feedforward of damping and springs.
         achieved: (N, n) spring torque Γ_sea, Nm.
@@ -42,6 +45,7 @@ class TorqueTrace:
     damping_scale: float
     stiffness: float
     walk: Walk
+    sent: Array
     command: Array
     achieved: Array
     deviation: Array
@@ -72,8 +76,9 @@ def figure_5(
 
 def _trace(project: str, stiffness: float, scale: float, beta: float) -> TorqueTrace:
     system = load(project)
+    walking = walking_of(system)
     case = WalkCase(
-        walking=walking_of(system),
+        walking=replace(walking, steps=max(walking.steps, STEPS)),
         inertia_shaping=beta,
         damping_scale=scale,
         spring_stiffness=stiffness,
@@ -90,6 +95,7 @@ def _trace(project: str, stiffness: float, scale: float, beta: float) -> TorqueT
         damping_scale=scale,
         stiffness=stiffness,
         walk=walk,
+        sent=sent,
         command=asked,
         achieved=run.tau_sea,
         deviation=_rms((asked - run.tau_sea)[late]),

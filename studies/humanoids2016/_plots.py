@@ -12,7 +12,7 @@ from humanoids2016._figure4 import Figure4
 from humanoids2016._figure5 import TorqueTrace
 from humanoids2016._levels import LevelTable
 from humanoids2016._walk import Walk
-from sealag.whole_body import StaticJoint, StiffnessForm
+from sealag.whole_body import MotorAngles, StaticJoint, StiffnessForm
 
 COLOURS = ("#0b6e99", "#c0561f", "#5b7f2b")
 
@@ -56,10 +56,10 @@ def plot_figure_4(figure: Figure4) -> str:
                 figure.alpha, delay * 1e3, "-o", ms=3.5, color=colour,
                 label=f"(29), D_θ[0] = {damping:g} Nms/rad",
             )  # fmt: skip
-        static = _variant(figure, StaticJoint.name)
+        name, certified = _certified(figure)
         axes.plot(
-            figure.alpha, figure.alpha * static * 1e3, "--", color="#777",
-            label="certified, q̄(θ) fed back, D_θ[0] = 10",
+            figure.alpha, figure.alpha * certified * 1e3, "--", color="#777",
+            label=f"certified, {name} fed back, D_θ[0] = 10",
         )  # fmt: skip
         axes.set_xlabel("α, factor on the motor damping D_θ")
         axes.set_ylabel("largest delay over the walk (ms)")
@@ -70,12 +70,15 @@ def plot_figure_4(figure: Figure4) -> str:
         return _svg(drawing)
 
 
-def _variant(figure: Figure4, signal: str) -> float:
-    return next(
-        float(v.delay_s.min())
-        for v in figure.certified
-        if v.signal == signal and v.form is StiffnessForm.SYMMETRIC
-    )
+def _certified(figure: Figure4) -> tuple[str, float]:
+    """The smallest certified bound with q̄(θ) fed back, or with θ where q̄(θ) does not exist."""
+    least = {
+        v.signal: float(v.delay_s.min())
+        for v in reversed(figure.certified)
+        if v.form is StiffnessForm.SYMMETRIC and not v.reason
+    }
+    name = StaticJoint.name if StaticJoint.name in least else MotorAngles.name
+    return ("q̄(θ)" if name == StaticJoint.name else "θ"), least.get(name, 0.0)
 
 
 def plot_walk_bounds(figure: Figure4) -> str:
@@ -187,6 +190,37 @@ def plot_torques(traces: Sequence[TorqueTrace], joints: Sequence[int]) -> str:
             axes.grid(alpha=0.25)
         axes.set_xlabel("time (s)")
         np.atleast_1d(panels)[0].legend(frameon=False, fontsize=10, ncols=2)
+        return _svg(drawing)
+
+
+LAG_WINDOW = (1.0, 2.2)
+"""Part of the walk in which the lag is shown, s."""
+
+
+def plot_lag(traces: Sequence[TorqueTrace], joint: int) -> str:
+    """Draw a joint's command as it is sent and its spring torque, one panel for each β.
+
+    Args:
+        traces: walks with several β.
+        joint: its place.
+
+    Returns:
+        SVG markup.
+    """
+    with _drawing(7.2, 2.1 * len(traces), rows=len(traces)) as (drawing, panels):
+        for axes, trace in zip(np.atleast_1d(panels), traces, strict=True):
+            time = trace.walk.run.time
+            pick = (time >= LAG_WINDOW[0]) & (time <= LAG_WINDOW[1])
+            axes.plot(time[pick], trace.sent[pick, joint], color="#000", lw=0.9, label="Γ_osc")
+            axes.plot(
+                time[pick], trace.achieved[pick, joint], color=COLOURS[1], lw=2.0, alpha=0.8,
+                label="Γ_sea",
+            )  # fmt: skip
+            axes.set_ylabel(f"β = {trace.beta:g} (Nm)")
+            axes.grid(alpha=0.25)
+        axes = np.atleast_1d(panels)
+        axes[-1].set_xlabel("time (s)")
+        axes[0].legend(frameon=False, fontsize=10, ncols=2)
         return _svg(drawing)
 
 

@@ -67,6 +67,12 @@ class SeaPlant:
         return bool(np.linalg.eigvalsh(self.F + self.F.T)[0] >= -_SYMMETRIC * size)
 
     @property
+    def presupposed(self) -> bool:
+        """Whether the paper's law can be run on it: ΛK_x, motor angles or a q̄(θ) that exists."""
+        exists = not self.signal.refusal(np.array([self.contraction]))
+        return self.form is StiffnessForm.PUBLISHED and self.signal.has_potential and exists
+
+    @property
     def stable(self) -> bool:
         """Whether the potential's Hessian over [q, θ] is positive definite up to symmetries."""
         K, n = np.diag(self.K), len(self.K)

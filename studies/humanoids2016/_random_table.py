@@ -78,8 +78,12 @@ class RandomPlantTable:
     Attributes:
         plants: number of plants.
         undecided: for how many the exact margin could not be decided; they count for neither.
-        published_longer: for how many (29) allows a delay at which the plant is unstable.
+        presupposed: for how many the paper's law is what runs: ΛK_x as printed, with motor angles
+            or a q̄(θ) that exists, x̂ of the tank included.
+        published_longer: for how many of these (29) allows a delay at which the plant is unstable.
         published_without_delay: how many of those are unstable without any delay.
+        other_longer: the same as `published_longer` for all other plants: link angles fed back,
+            other stiffness forms, no q̄(θ).
         certified_spoke: for how many the certified criterion gave a bound and the potential has
             a minimum.
         certified_longer: for how many of those the bound exceeds the exact margin.
@@ -89,8 +93,10 @@ class RandomPlantTable:
 
     plants: int
     undecided: int
+    presupposed: int
     published_longer: int
     published_without_delay: int
+    other_longer: int
     certified_spoke: int
     certified_longer: int
     smallest_ratio: float
@@ -109,7 +115,8 @@ def random_plant_table(count: int = 1000, *, seed: int = 0) -> RandomPlantTable:
     """
     all_ = [compare_plant(index) for index in range(seed, seed + count)]
     known = [one for one in all_ if one.margin_s is not None]
-    longer = [one for one in known if one.published_is_longer]
+    unsafe = [one for one in known if one.published_is_longer]
+    longer = [one for one in unsafe if one.plant.presupposed]
     spoken = [
         (one.margin_s, one.certified_s)
         for one in all_
@@ -119,8 +126,10 @@ def random_plant_table(count: int = 1000, *, seed: int = 0) -> RandomPlantTable:
     return RandomPlantTable(
         plants=count,
         undecided=count - len(known),
+        presupposed=sum(one.plant.presupposed for one in all_),
         published_longer=len(longer),
         published_without_delay=sum(one.margin_s == 0.0 for one in longer),
+        other_longer=len(unsafe) - len(longer),
         certified_spoke=len(spoken),
         certified_longer=sum(one.certified_is_longer for one in known),
         smallest_ratio=float(np.min(ratios)),

@@ -75,7 +75,8 @@ def test_numbers_off_a_theorem_contradict_it(figure, table):
 
 def _trace(*, beta, alpha, deviation, raw, lag, walk):
     return TorqueTrace(
-        beta=beta, damping_scale=alpha, stiffness=350.0, walk=walk, command=np.zeros((0, 6)),
+        beta=beta, damping_scale=alpha, stiffness=350.0, walk=walk, sent=np.zeros((0, 6)),
+        command=np.zeros((0, 6)),
         achieved=np.zeros((0, 6)), deviation=np.full(6, deviation), raw_deviation=np.full(6, raw),
         command_lag=lag, torque_lag=lag, channel=0.0158,
     )  # fmt: skip
@@ -148,7 +149,9 @@ def test_random_plants_show_the_difference():
     table = random_plant_table(120, seed=40)
     assert table.certified_longer == 0
     assert table.smallest_ratio >= 1.0
-    assert table.published_longer > 5
+    assert table.published_longer >= table.published_without_delay > 2
+    assert table.other_longer > 5
+    assert table.presupposed > 10
     assert table.certified_spoke > 20
 
 
@@ -170,8 +173,14 @@ def test_hume_walks_and_the_energy_closes():
     assert walk.run.measurement_age.max() > 0.01
     motion = simulated_motion(walk.run)
     assert {c[0].frame for c in motion.contact_sets} == {"left_foot", "right_foot"}
-    switches = np.count_nonzero(np.diff(motion.contact_index))
+    carrying = np.array([c[0].frame for c in motion.contact_sets])[motion.contact_index]
+    switches = np.count_nonzero(carrying[1:] != carrying[:-1])
     assert walk.gait.steps - 1 <= switches <= walk.gait.steps + 3
+    standing = np.array([len(c) for c in motion.contact_sets])[motion.contact_index]
+    forces = [walk.run.contact_force[:, k, 2] > 0.0 for k in range(len(walk.run.feet))]
+    both = np.sum(forces, axis=0) == 2
+    np.testing.assert_array_equal(standing == 2, both)
+    assert 0.1 < both.mean() < 0.3
 
 
 def test_a_walk_beyond_its_delay_ends_as_a_named_fall():
