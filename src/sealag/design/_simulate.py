@@ -3,12 +3,15 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sealag.design._design import Design
+from sealag.design._project import loaded
 from sealag.design._schema import SCENARIOS
+from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.robot import ContactKind
 from sealag.simulation import Clock, Foot, Network, Push, Run, Scene, closed_loop
@@ -32,7 +35,7 @@ _SPOT_SPEED = 1e-3  # m/s
 
 
 def simulate(
-    system: Design,
+    project: System | str | Path,
     *,
     scenario: str | None = None,
     duration: float | None = None,
@@ -51,7 +54,7 @@ def simulate(
     the project's [walking] section.
 
     Args:
-        system: the design.
+        project: the design, or its project file.
         scenario: one of the five; the project's if None.
         duration: s; the project's, or the walk's, if None.
         seed: of jitter and losses; the project's if None.
@@ -67,7 +70,9 @@ def simulate(
         InputError: the scenario is unknown, duration, seed or delay_scale cannot be, the recording
             would not fit into the temporary folder, a push does not act during the run, a foot
             begins inside the ground, or the torque limits cannot hold the posture.
+        FileError: the project file cannot be read.
     """
+    system = loaded(project)
     setting = system.simulation
     kind = setting.scenario if scenario is None else scenario
     if kind not in SCENARIOS:

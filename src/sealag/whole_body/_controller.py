@@ -18,7 +18,7 @@ class Controller:
 
     The configuration that x and all matrices are taken at is moved from the measured one along
     the contact-consistent motions by the difference between the fed-back joint angles and the
-    measured ones. A robot's driver calls it exactly as the simulator does; after the first tick no
+    measured ones. `System.controller()` makes the one of a design. A robot's driver calls it exactly as the simulator does; after the first tick no
     memory is allocated that outlives a tick.
     """
 
