@@ -1,6 +1,6 @@
 """Array aliases. A name says what an array is; docstrings say its shape.
 
-They are named types, so that `help` and `inspect.signature` show their names and not NumPy's unions.
+They are named types: `help` and `inspect.signature` show their names and not NumPy's unions.
 """
 
 from typing import Any

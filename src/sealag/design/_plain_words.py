@@ -33,8 +33,8 @@ def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> t
         path: what the message calls the file.
 
     Returns:
-        The key, and the sentence; it names the file, the key, what was found and what is needed. What a starter
-        file leaves to be filled in comes first, and all of it at once.
+        The key, and the sentence; it names the file, the key, what was found and what is needed.
+        What a starter file leaves to be filled in comes first, and all of it at once.
     """
     unfilled = [problem for problem in problems if _is_unfilled(problem)]
     if unfilled:

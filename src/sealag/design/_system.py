@@ -217,6 +217,6 @@ class System(Design):
 
     def simulate(self, **choices: Any) -> "Run":
         """Run the controller on the delayed robot; see `sealag.simulate` for the choices."""
-        from sealag.design._simulate import simulate
+        from sealag.design._simulate import run_design
 
-        return simulate(self, **choices)
+        return run_design(self, **choices)
