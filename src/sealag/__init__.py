@@ -36,7 +36,7 @@ _HOME = {
     "SealagError": "sealag.errors",
 }
 
-_ROOMS = ("actuation", "delay", "design", "errors", "margin", "passivity", "report", "robot",
+_ROOMS = ("actuation", "delay", "design", "errors", "export", "margin", "passivity", "report", "robot",
           "simulation", "walking", "whole_body")  # fmt: skip
 
 __all__ = [
