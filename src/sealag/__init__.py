@@ -36,6 +36,9 @@ _HOME = {
     "SealagError": "sealag.errors",
 }
 
+_ROOMS = ("actuation", "delay", "design", "errors", "export", "margin", "passivity", "report", "robot",
+          "simulation", "walking", "whole_body")  # fmt: skip
+
 __all__ = [
     "Actuators",
     "Certificate",
@@ -88,4 +91,10 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
+    if name in _ROOMS:
+        return import_module(f"sealag.{name}")
     raise AttributeError(f"module 'sealag' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*__all__, *_ROOMS})

@@ -7,12 +7,31 @@ result, never an exception.
 import difflib
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
-from typing import TypeVar
+from typing import Self, TypeVar
 from unicodedata import normalize
 
 
 class SealagError(Exception):
-    """Root of every error that sealag raises on purpose; the command line exits with status 2."""
+    """Root of every error that sealag raises on purpose; the command line exits with status 2.
+
+    Attributes:
+        file: the file that is wrong, where that is known.
+        key: its key or column, where one is to blame.
+    """
+
+    file: str | None = None
+    key: str | None = None
+
+    def at(self, file: object, key: str | None = None) -> Self:
+        """Return this error with its place, unless it has one.
+
+        Args:
+            file: path of the file that is wrong.
+            key: its key or column.
+        """
+        self.file = self.file or str(file)
+        self.key = self.key or key or None
+        return self
 
 
 class InputError(SealagError, ValueError):

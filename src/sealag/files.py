@@ -63,10 +63,12 @@ def opened(path: Path, *, what: str, largest: int) -> Iterator[BinaryIO]:
             if status.st_size > largest:
                 raise _too_large(what, path, largest)
             yield file
-    except SealagError:
+    except SealagError as error:
+        error.at(path)
         raise
     except OSError as error:
-        raise FileError(f"{what} {path} cannot be read: {error.strerror or error}.") from error
+        said = f"{what} {path} cannot be read: {error.strerror or error}."
+        raise FileError(said).at(path) from error
     except ValueError as error:
         raise FileError(f"{what} {str(path)!r} cannot be read: {error}.") from error
 

@@ -1,17 +1,24 @@
-"""Array aliases. A name says what an array is; docstrings say its shape."""
+"""Array aliases. A name says what an array is; docstrings say its shape.
 
-from typing import Any, TypeAlias
+They are named types: `help` and `inspect.signature` show their names and not NumPy's unions.
+"""
+
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+import numpy.typing as npt
+from typing_extensions import TypeAliasType
 
-Array: TypeAlias = NDArray[Any]
+Array = TypeAliasType("Array", npt.NDArray[Any])
 """Array of doubles; NumPy's own annotations are too wide for `NDArray[np.float64]`."""
 
-IntArray: TypeAlias = NDArray[np.int64]
+ArrayLike = TypeAliasType("ArrayLike", npt.ArrayLike)
+"""What NumPy makes an array of: an array, a number or lists of numbers."""
+
+IntArray = TypeAliasType("IntArray", npt.NDArray[np.int64])
 """Array of 64-bit integers."""
 
-BoolArray: TypeAlias = NDArray[np.bool_]
+BoolArray = TypeAliasType("BoolArray", npt.NDArray[np.bool_])
 """Array of truth values."""
 
 __all__ = ["Array", "ArrayLike", "BoolArray", "IntArray"]

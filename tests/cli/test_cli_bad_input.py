@@ -1,5 +1,6 @@
 """Bad input: one sentence that names file, key and remedy, exit status 2, never a traceback."""
 
+import json
 import os
 import sys
 import time
@@ -20,7 +21,10 @@ def fails(capsys, *arguments):
         main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
     assert stop.value.code == 2
-    assert out == ""
+    if "--json" in arguments:
+        assert json.loads(out)["status"] == "error"
+    else:
+        assert out == ""
     assert "Traceback" not in err
     assert err.count("\n") == 1, err
     assert len(err) < 2100

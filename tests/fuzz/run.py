@@ -15,7 +15,7 @@ import sealag
 from fuzz.mutate import mutated, mutated_urdf
 from helpers.toml import to_toml
 from sealag.errors import SealagError
-from sealag.report import MujocoModel
+from sealag.export import MujocoModel
 
 ROOT = Path(__file__).resolve().parents[2]
 CASES = ROOT / "tests" / "data" / "cases"

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from sealag.design import System
-from sealag.report import MujocoModel
+from sealag.export import MujocoModel
 from sealag.whole_body import Measurement
 
 _LATE = re.compile(r' (?:delay|nsample|interp)="[^"]*"')

@@ -26,6 +26,8 @@ COMMANDS = {
 NOT_IMPORTED = {
     "example-robot-data": "holds URDFs and no code",
     "daqp": "Pink's solver, asked for by name in bench/",
+    "pandas": "sealag.extras imports it by name, where it is asked for",
+    "control": "the same",
 }
 
 

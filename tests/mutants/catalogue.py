@@ -53,7 +53,7 @@ TESTS = {
              "tests/oracle/test_robot_mimic.py tests/unit/test_design_cases.py",
     "files": "tests/unit/test_files.py tests/unit/test_report_mcap.py "
              "tests/cli/test_cli_outputs.py",
-    "report": "tests/unit/test_report_mujoco.py tests/oracle/test_export_mujoco.py",
+    "export": "tests/unit/test_report_mujoco.py tests/oracle/test_export_mujoco.py",
     "cli": "tests/cli/test_cli_terminal.py tests/cli/test_cli_status.py "
            "tests/cli/test_cli_certify.py tests/cli/test_cli_simulate.py",
     "units": "tests/unit/test_units.py tests/unit/test_design_starter.py",
@@ -589,7 +589,7 @@ MUTANTS = [
          "times of messages, by a nanosecond"),
     ),
     *_of(
-        "report", "report/_mujoco_delays.py",
+        "export", "export/_mujoco_delays.py",
         ("if link.constant:", "if True:", "delays that vary, in MuJoCo"),
         ("math.ceil(hop / look) * look", "hop", "looks of receivers, in MuJoCo"),
         ('"delay of commands": down + drive', '"delay of commands": down',
@@ -598,7 +598,7 @@ MUTANTS = [
         ("if step > longest * (1.0 + 1e-9):", "if False:", "steps that springs do not allow"),
     ),
     *_of(
-        "report", "report/_mujoco.py",
+        "export", "export/_mujoco.py",
         ('"nsample": str(count)', '"nsample": str(count + 1)', "a sample more than steps"),
         ("shaping[i] * drives.viscous_friction[i]", "drives.viscous_friction[i]",
          "friction of a shaped rotor, in MuJoCo"),

@@ -12,7 +12,7 @@ from helpers.mimics import joint, link, robot
 from helpers.mujoco_export import Exported
 from helpers.small_systems import arm, arm_system, constant_delays
 from sealag.delay import Constant
-from sealag.report import MujocoModel
+from sealag.export import MujocoModel
 from sealag.simulation import Clock, Foot, Network, Scene, closed_loop
 
 STEP = 1e-3

@@ -15,7 +15,7 @@ from helpers.small_systems import arm_system, constant_delays
 from sealag.actuation import Actuators
 from sealag.delay import Constant, Delays, Link, RoundTrip, Sinusoid, Table
 from sealag.errors import InputError
-from sealag.report import MujocoModel
+from sealag.export import MujocoModel
 from sealag.simulation import Clock, Network
 
 

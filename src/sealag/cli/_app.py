@@ -7,12 +7,14 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
+from sealag.cli._json import show_json_error
 from sealag.cli._terminal import open_streams, show, write_no_more
 from sealag.errors import SealagError, SolverError
 from sealag.version import __version__
@@ -39,7 +41,9 @@ app = typer.Typer(
 )
 
 Project = Annotated[str, typer.Argument(help="Project file (TOML), or bundled:hume.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object and nothing else; errors too.")
+]
 MotionFile = Annotated[
     Path | None,
     typer.Option(
@@ -345,13 +349,25 @@ def _report(error: Exception, words: Sequence[str]) -> str:
     return path
 
 
+def _tell(words: Sequence[str], kind: str, message: str, error: SealagError | None = None) -> None:
+    """Show what went wrong: one sentence on standard error, and one object where one was asked for.
+
+    A full disk takes no object either: the status alone says it then.
+    """
+    show(f"sealag: {message}", error=True)
+    if "--json" in words:
+        with suppress(OSError):
+            file, key = (error.file, error.key) if error else (None, None)
+            show_json_error(kind, message, file=file, key=key)
+
+
 def _status(words: Sequence[str]) -> int:
     """Run the command line and return its status; what goes wrong is one sentence."""
     try:
         status = app(args=words, prog_name="sealag", standalone_mode=False)
         sys.stdout.flush()
     except SealagError as error:
-        show(f"sealag: {error}", error=True)
+        _tell(words, type(error).__name__, str(error), error)
         return FAILED if isinstance(error, SolverError) else WRONG
     except TyperException as error:
         known = {
@@ -359,7 +375,7 @@ def _status(words: Sequence[str]) -> int:
         }
         asked = f"{words[0]} " if words[0] in known else ""
         problem = error.format_message().rstrip(".")
-        show(f"sealag: {problem}; see sealag {asked}--help.", error=True)
+        _tell(words, "UsageError", f"{problem}; see sealag {asked}--help.")
         return WRONG
     except (BrokenPipeError, SystemExit):  # Typer ends with 1, a no, when the reader is gone
         return WRONG
@@ -369,10 +385,11 @@ def _status(words: Sequence[str]) -> int:
             return WRONG
         said = " ".join(str(error).split())[:300]
         report = _report(error, words)
-        show(
-            f"sealag: the tool itself failed ({type(error).__name__}: {said}); this is no answer "
+        _tell(
+            words,
+            "ToolFailure",
+            f"the tool itself failed ({type(error).__name__}: {said}); this is no answer "
             f"about the design. Please report it with {report or 'the command'} and its files.",
-            error=True,
         )
         return FAILED
     if status == INTERRUPTED:
@@ -384,7 +401,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and end the process with its status.
 
     0 yes or done, 1 no, 2 wrong input or an answer that cannot be written, 3 the tool failed, 130
-    interrupted. What goes wrong is one sentence on standard error.
+    interrupted. What goes wrong is one sentence on standard error; with --json also one object on
+    standard output, `{"status": "error", "error": {"kind", "file", "key", "message"}}`, but for
+    Ctrl-C and an answer that cannot be written.
 
     Args:
         arguments: what follows the program's name; the process's own if None.

@@ -10,7 +10,6 @@ from typing import Any
 from sealag import design
 from sealag.cli._json import show_json
 from sealag.cli._terminal import show
-from sealag.design import System
 from sealag.errors import CertificateError, FileError, InputError
 from sealag.files import check_output, opened, write_text
 from sealag.passivity import Certificate, Status
@@ -84,19 +83,6 @@ def busy(what: str, motion: Motion | None = None) -> Iterator[None]:
         yield
 
 
-def motion_of(system: System, path: Path | None) -> Motion | None:
-    """Return the motion that is named, else the project's own, else None.
-
-    Args:
-        system: the design.
-        path: what --motion names.
-    """
-    chosen = path or system.motion_file
-    if chosen is None:
-        return None
-    return system.load_motion(chosen)
-
-
 def margin_project(
     project: str,
     motion: Path | None,
@@ -118,7 +104,7 @@ def margin_project(
         )
     system = design.load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
-    along = motion_of(system, motion)
+    along = system.motion_of(motion)
     compile_kernels()
     with busy("computing margins", along):
         found = system.local_margins(along, horizon=horizon)
@@ -194,9 +180,8 @@ def verify_certificate(
     else:
         Certificate.read(path)
         system = design.load(project)
-        along = motion_of(system, motion)
         compile_kernels()
-        result = design.verify_design(path, system, along, exact=exact)
+        result = design.verify_design(path, system, motion, exact=exact)
     if as_json:
         show_json(result.to_json_dict())
     else:

@@ -4,6 +4,7 @@ import re
 import sys
 from dataclasses import dataclass, replace
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_info
@@ -18,6 +19,7 @@ from sealag.design._criteria import (
     time_varying_bound,
 )
 from sealag.design._local import MOST_EXACT, Local, local_of
+from sealag.design._project import loaded
 from sealag.design._system import PROOF_COUNT, System
 from sealag.passivity import (
     Answer,
@@ -105,8 +107,8 @@ class _Case:
 
 
 def certify(
-    system: System,
-    motion: Motion | None = None,
+    project: System | str | Path,
+    motion: Motion | str | Path | None = None,
     *,
     criterion: Criterion | str | None = None,
     time_varying: bool = False,
@@ -119,8 +121,9 @@ def certify(
     and where the loop that holds it rests.
 
     Args:
-        system: the design.
-        motion: the motion; the system's posture if None.
+        project: the design, or its project file, `bundled:hume` among them.
+        motion: the motion, or its file; the project's own motion if None, or the posture where the
+            project names none.
         criterion: certified (docs/theory section 6) or published ((29), (31) as printed); the
             system's own if None.
         time_varying: also bound the delay for matrices that move inside polytopes around the
@@ -136,14 +139,16 @@ def certify(
         The certificate; not certified is a result, not an error.
 
     Raises:
-        InputError: fewer than one proof is asked for, the criterion or the motion is none, or a
-            time-varying bound is asked of one instant or of the published criterion.
+        InputError: fewer than one proof is asked for, the project, the criterion or the motion is
+            none, or a time-varying bound is asked of one instant or of the published criterion.
+        FileError: a file cannot be read.
         RobotError: a mass matrix is not positive definite.
         UnknownNameError: a frame or joint does not exist.
     """
+    system = loaded(project)
+    motion = system.motion_of(motion)
     kind = system.criterion_asked(motion, criterion, time_varying=time_varying, proofs=proofs)
     along = Along.of(system, motion)
-    motion = along.motion
     rest = system.rest(motion) if len(motion) == 1 else None
     bounds = bounds_along(along, kind, rest=rest, published=True, solver=solver)
     printed = kind is Criterion.PUBLISHED

@@ -24,7 +24,7 @@ _NEEDS = {
 }
 
 
-def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> str:
+def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> tuple[str, str]:
     """Say in one sentence what is wrong first, where, and what would be right.
 
     Args:
@@ -33,13 +33,13 @@ def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> s
         path: what the message calls the file.
 
     Returns:
-        The sentence; it names the file, the key, what was found and what is needed. What a starter
-        file leaves to be filled in comes first, and all of it at once.
+        The key, and the sentence; it names the file, the key, what was found and what is needed.
+        What a starter file leaves to be filled in comes first, and all of it at once.
     """
     unfilled = [problem for problem in problems if _is_unfilled(problem)]
     if unfilled:
         keys = dict.fromkeys(_key(problem["loc"], data) for problem in unfilled)
-        return f"{path}: still to be filled in: {', '.join(keys)}."
+        return next(iter(keys)), f"{path}: still to be filled in: {', '.join(keys)}."
     first = problems[0]
     key = _key(first["loc"], data)
     more = len({tuple(problem["loc"]) for problem in problems}) - 1
@@ -47,11 +47,13 @@ def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> s
     found = first.get("input")
     match first["type"]:
         case "missing":
-            return f"{path}: the key {key} is missing.{rest}"
+            return key, f"{path}: the key {key} is missing.{rest}"
         case "union_tag_not_found":
-            return f"{path}: the key {key}.kind is missing.{rest}"
+            return f"{key}.kind", f"{path}: the key {key}.kind is missing.{rest}"
         case "extra_forbidden":
-            return f"{path}: the key {key} is not known; check its spelling and section.{rest}"
+            return key, (
+                f"{path}: the key {key} is not known; check its spelling and section.{rest}"
+            )
         case "union_tag_invalid":
             key, found = f"{key}.kind", first["ctx"]["tag"]
             need = f"it must be one of {first['ctx']['expected_tags']}"
@@ -59,7 +61,7 @@ def first_problem(problems: list[Any], data: dict[str, Any], *, path: Path) -> s
             need = _NEEDS[kind].format(**first.get("ctx", {})) if kind in _NEEDS else first["msg"]
     shown = repr(found) if len(repr(found)) < 60 else f"a {type(found).__name__}"
     unit = " (in ms: was another unit meant?)" if key.endswith("_ms") else ""
-    return f"{path}: {key} is {shown}; {need}{unit}.{rest}"
+    return key, f"{path}: {key} is {shown}; {need}{unit}.{rest}"
 
 
 def _is_unfilled(problem: Any) -> bool:

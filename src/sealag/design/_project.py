@@ -33,7 +33,7 @@ from sealag.design._schema import (
 )
 from sealag.design._system import System
 from sealag.design._walking import walking_of
-from sealag.errors import FileError, ProjectError, SealagError
+from sealag.errors import FileError, InputError, ProjectError, SealagError
 from sealag.files import bundled, read_whole
 from sealag.passivity import Criterion
 from sealag.robot import Contact, ContactKind, Robot, load_robot
@@ -74,9 +74,25 @@ def load(path: str | Path) -> System:
     """
     path = _resolved(path)
     content = read_whole(path, what="The project file", largest=LARGEST_PROJECT_BYTES)
-    project = _parsed(content, path)
     with _named(path, ""):
+        project = _parsed(content, path)
         return _system(project, path, content.decode("utf-8-sig"))
+
+
+def loaded(project: System | str | Path) -> System:
+    """Return a system as it is, or the one that a project file describes.
+
+    Args:
+        project: the system, or its file as `load` takes it.
+
+    Raises:
+        InputError: it is neither; otherwise as `load` raises it.
+    """
+    if isinstance(project, System):
+        return project
+    if not isinstance(project, str | Path):
+        raise InputError(f"project is {project!r}; a System or a project file's path is needed.")
+    return load(project)
 
 
 def _resolved(text: str | Path) -> Path:
@@ -107,7 +123,8 @@ def _parsed(content: bytes, path: Path) -> Project:
     try:
         return Project.model_validate(data)
     except ValidationError as error:
-        raise ProjectError(first_problem(error.errors(), data, path=path)) from error
+        key, words = first_problem(error.errors(), data, path=path)
+        raise ProjectError(words).at(path, key) from error
 
 
 def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
@@ -128,10 +145,12 @@ def _named(path: Path, key: str) -> Iterator[None]:
     try:
         yield
     except SealagError as error:
-        if str(error).startswith(f"{path}: "):
+        if str(error).startswith((f"{path}: ", f"{path} ")):
+            error.at(path, key)
             raise
         kind = FileError if isinstance(error, FileError) else ProjectError
-        raise kind(f"{path}: {key}{': ' if key else ''}{error}") from error
+        named = kind(f"{path}: {key}{': ' if key else ''}{error}").at(path, key)
+        raise named from error
 
 
 def _system(project: Project, path: Path, text: str) -> System:

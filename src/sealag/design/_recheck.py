@@ -9,6 +9,7 @@ import numpy as np
 from sealag.design._along import Along
 from sealag.design._certify import certify
 from sealag.design._criteria import delayed_stiffness
+from sealag.design._project import loaded
 from sealag.design._system import System
 from sealag.errors import InputError
 from sealag.passivity import Certificate, Criterion, InstantProof, LocalLoop, Verification
@@ -37,8 +38,8 @@ at different points. `verify` checks them from the file; the checks below compar
 
 def verify_design(
     certificate: Path | str | Mapping[str, Any],
-    system: System,
-    motion: Motion | None = None,
+    project: System | str | Path,
+    motion: Motion | str | Path | None = None,
     *,
     exact: bool = False,
 ) -> Verification:
@@ -53,8 +54,8 @@ def verify_design(
 
     Args:
         certificate: a file, or the plain data in it.
-        system: the design.
-        motion: the motion that was certified; the system's posture if None.
+        project: the design, or its project file.
+        motion: the motion that was certified, or its file; as `certify` takes it.
         exact: decide definiteness in rational arithmetic.
 
     Returns:
@@ -68,12 +69,15 @@ def verify_design(
     found = Certificate.verify(certificate, exact=exact)
     claimed = Certificate.read(certificate)
     count = claimed.question.instants
-    if motion is None and count > 1:
+    system = loaded(project)
+    if motion is None and system.motion_file is None and count > 1:
         raise InputError(f"The certificate is of a motion of {count} instants; name it (--motion).")
-    return found.extended(_recomputed(claimed, system, motion)) if found.valid else found
+    if not found.valid:
+        return found
+    return found.extended(_recomputed(claimed, system, system.motion_of(motion)))
 
 
-def _recomputed(claimed: Certificate, system: System, motion: Motion | None) -> Iterator[_Check]:
+def _recomputed(claimed: Certificate, system: System, motion: Motion) -> Iterator[_Check]:
     """What follows from robot, project and motion."""
     proofs, kind = claimed.evidence.proofs, claimed.question.criterion
     fresh = certify(system, motion, criterion=kind, proofs=max(len(proofs), 1)).confirmed()

@@ -31,7 +31,7 @@ FINER = 4
 _SPOT_SPEED = 1e-3  # m/s
 
 
-def simulate(
+def run_design(
     system: Design,
     *,
     scenario: str | None = None,
@@ -41,32 +41,16 @@ def simulate(
     log_period: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Run a design's whole-body controller on the delayed robot, with contacts and energy audit.
-
-    Scenarios: `regulate` holds the posture while the project's pushes act; `balance` does so with
-    a push of 5 % of the weight for 0.1 s if the project has none, or, if the project has a
-    [walking] section, by stepping on the spot on flat ground, since a biped on point feet cannot
-    stand; `track` moves the first task's first row as a sinusoid; `drop` begins above the ground,
-    or, with a fixed base, with springs that do not yet carry the joints; `walk` takes the steps of
-    the project's [walking] section.
+    """Run a design as `sealag.simulate` says it.
 
     Args:
         system: the design.
-        scenario: one of the five; the project's if None.
-        duration: s; the project's, or the walk's, if None.
-        seed: of jitter and losses; the project's if None.
+        scenario: what happens.
+        duration: s.
+        seed: of jitter and losses.
         delay_scale: factor on both round trips.
-        log_period: time between two logged instants, s; the project's, or the controller's period,
-            if None.
+        log_period: time between two logged instants, s.
         progress: called with the simulated time.
-
-    Returns:
-        The run; a fall or divergence is its named outcome.
-
-    Raises:
-        InputError: the scenario is unknown, duration, seed or delay_scale cannot be, the recording
-            would not fit into the temporary folder, a push does not act during the run, a foot
-            begins inside the ground, or the torque limits cannot hold the posture.
     """
     setting = system.simulation
     kind = setting.scenario if scenario is None else scenario

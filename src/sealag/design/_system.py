@@ -73,6 +73,26 @@ class System(Design):
         """
         return load_motion(path, self.robot, contacts=self.contacts)
 
+    def motion_of(self, given: Motion | str | Path | None = None) -> Motion:
+        """Return the motion that an answer is of.
+
+        Args:
+            given: a motion, or its file; None for the project's own motion, or the posture where
+                the project names none. `still` is always the posture.
+
+        Raises:
+            InputError: it is none of these.
+            FileError: as `load_motion` raises it; so MotionError.
+        """
+        chosen = self.motion_file if given is None else given
+        if chosen is None:
+            return self.still()
+        if isinstance(chosen, Motion):
+            return chosen
+        if not isinstance(chosen, str | Path):
+            raise InputError(f"motion is {chosen!r}; a Motion or the path of its file is needed.")
+        return self.load_motion(chosen)
+
     def save_motion(self, motion: Motion, path: str | Path) -> None:
         """Write a motion of the robot as CSV, NPZ or Parquet through a temporary name.
 
@@ -99,7 +119,7 @@ class System(Design):
         return local_of(Along.of(self, motion), bounds, rest)
 
     def local_margins(
-        self, motion: Motion | None = None, *, horizon: float | None = None
+        self, motion: Motion | str | Path | None = None, *, horizon: float | None = None
     ) -> LocalMargins:
         """Decide the exact local margin of the law that runs, and its jitter margin, over a motion.
 
@@ -110,7 +130,7 @@ class System(Design):
         decides are computed only where their passive bound lies below the smallest margin.
 
         Args:
-            motion: the motion; the system's posture if None.
+            motion: the motion or its file; as `motion_of` takes it.
             horizon: longest delay up to which the ranges of stable and unstable delay are listed,
                 s.
 
@@ -119,7 +139,7 @@ class System(Design):
             ContractionError: q̄(θ) is fed back and does not exist.
             SolverError: the margin at the instant that sets it could not be decided.
         """
-        return local_margins(Along.of(self, motion), horizon)
+        return local_margins(Along.of(self, self.motion_of(motion)), horizon)
 
     def rate_sweep(self, rates: Sequence[float] = RATES) -> tuple[Rate, ...]:
         """Return what each sample rate tolerates, in the posture; docs/theory section 7.6.
@@ -159,7 +179,7 @@ class System(Design):
 
     def criterion_asked(
         self,
-        motion: Motion | None = None,
+        motion: Motion | str | Path | None = None,
         criterion: Criterion | str | None = None,
         *,
         time_varying: bool = False,
@@ -168,7 +188,7 @@ class System(Design):
         """Return the criterion that `certify` would use, if what it is asked has an answer.
 
         Args:
-            motion: the motion, or None.
+            motion: the motion, as `motion_of` takes it.
             criterion: what is asked for, or None.
             time_varying: whether a bound for matrices that move is asked for.
             proofs: how many instants with their numbers; None for all.
@@ -177,9 +197,8 @@ class System(Design):
             InputError: as `certify` raises it.
         """
         self.require_law("A certificate's bounds are")
-        if not isinstance(motion, Motion | None):
-            raise InputError(f"motion is {motion!r}; System.load_motion makes a Motion of a file.")
-        if motion is not None and len(motion) > MOST_INSTANTS:
+        motion = self.motion_of(motion)
+        if len(motion) > MOST_INSTANTS:
             raise InputError(
                 f"The motion has {len(motion)} instants; a certificate holds {MOST_INSTANTS} at "
                 "most. Certify parts of the motion, or fewer of its rows."
@@ -189,7 +208,7 @@ class System(Design):
         name = self.criterion if criterion is None else criterion
         if name not in set(Criterion):
             raise InputError(f"criterion is {name!r}; it must be {either(list(Criterion))}.")
-        if time_varying and (name == Criterion.PUBLISHED or motion is None or len(motion) < 2):
+        if time_varying and (name == Criterion.PUBLISHED or len(motion) < 2):
             raise InputError(
                 "A time-varying bound needs the certified criterion and a motion of more than one "
                 "instant (--motion)."
@@ -198,6 +217,6 @@ class System(Design):
 
     def simulate(self, **choices: Any) -> "Run":
         """Run the controller on the delayed robot; see `sealag.simulate` for the choices."""
-        from sealag.design._simulate import simulate
+        from sealag.design._simulate import run_design
 
-        return simulate(self, **choices)
+        return run_design(self, **choices)

@@ -1,12 +1,14 @@
 """A linear loop with late signals, and what may be asked of it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from sealag.errors import InputError
+from sealag.extras import extra
 from sealag.margin._jitter import Broken, JitterMargin, jitter_margin
-from sealag.margin._loop import Loop, prepare, real_numbers, real_square, time_of
+from sealag.margin._loop import Loop, parts_of, prepare, real_numbers, real_square, time_of
 from sealag.margin._margin import DelayMargin, exact_margin
 from sealag.margin._roots import loop_roots
 from sealag.margin._sampled import Held, SampledMargin
@@ -181,6 +183,40 @@ class DelayedLoop:
             raise InputError(f"count is {count} and nodes {nodes}; at least 1 and 4 are needed.")
         return loop_roots(self._prepared(), delay, count=count, nodes=nodes)
 
+    def to_control(self) -> Any:
+        """Return the loop, opened where it is late, as a StateSpace of python-control.
+
+        ẋ = A_0 x + B u + E w with the outputs y = C x and, if there is an A_e = E R, v = R x. The
+        loop is u(t) = y(t − d), w(t) = v(t − e), without a change of sign. Exact: no delay is
+        approximated; a Padé approximant of your order goes between y and u. Where A_1 is given
+        whole, B holds columns of the identity and C the rows of A_1 that are not 0; so E and R of
+        A_e. Symmetries stay in.
+
+        Returns:
+            The system, inputs `u[0] …` and `w[0] …`, outputs `y[0] …` and `v[0] …`, states by name
+            where the loop has names, with _ for the points in them.
+
+        Raises:
+            InputError: python-control is not installed, or matrices do not fit or are not finite
+                real numbers.
+        """
+        control = extra("control", use="to_control")
+        A_0, A_1, A_e = parts_of(self.A_0, self.A_1, self.A_e, self.embedded_delay)
+        B, C = _rows_of(A_1) if self.C is None else self._sides()
+        E, R = _rows_of(A_e)
+        return control.StateSpace(
+            A_0,
+            np.hstack([B, E]),
+            np.vstack([C, R]),
+            np.zeros((len(C) + len(R), len(C) + len(R))),
+            states=[name.replace(".", "_") for name in self._state_names()],
+            inputs=_numbered("u", len(C)) + _numbered("w", len(R)),
+            outputs=_numbered("y", len(C)) + _numbered("v", len(R)),
+        )
+
+    def _state_names(self) -> tuple[str, ...]:
+        return tuple(_numbered("x", len(np.asarray(self.A_0))))
+
     def _sides(self) -> tuple[Array, Array]:
         """B and C; the identity and A_1 where that is given whole."""
         if self.C is None:
@@ -211,6 +247,16 @@ class DelayedLoop:
         """The loop, and it broken where it is late."""
         loop = self._prepared()
         return loop, Broken.of(loop, *self._sides())
+
+
+def _rows_of(matrix: Array) -> tuple[Array, Array]:
+    """Columns of the identity and the rows that are not 0, whose product is the matrix."""
+    rows = np.flatnonzero(matrix.any(axis=1))
+    return np.eye(len(matrix))[:, rows], matrix[rows]
+
+
+def _numbered(letter: str, count: int) -> list[str]:
+    return [f"{letter}[{k}]" for k in range(count)]
 
 
 def _held(loop: Loop, broken: Broken, *, period: float) -> Held:

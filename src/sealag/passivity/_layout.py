@@ -133,7 +133,7 @@ def _encoded(value: Any, kind: Any) -> Any:
     if origin is Annotated:
         time = kind == Time and value == math.inf
         return UNBOUNDED if time else _encoded(value, inner[0])
-    if origin is np.ndarray:
+    if kind is Array:
         return value.tolist() if value.size else []
     if origin is tuple:
         return [_encoded(entry, inner[0]) for entry in value]
@@ -203,7 +203,7 @@ class _Reader:
         return kind(**values)
 
     def sized(self, data: Any, kind: Any, names: tuple[str, ...], at: str) -> Any:
-        if get_origin(kind) is np.ndarray:
+        if kind is Array:
             return self.array(data, names, at)
         found = self.read(data, kind, at)
         self.check(found if kind is int else len(found), names[0], at)

@@ -61,87 +61,15 @@ def write_run(
             q_joint = robot.joint_positions(run.q[rows])
             rates = run.v[rows, robot.nv_base :]
             recorder.write_joint_states(time, q_joint, rates, effort=run.tau_sea[rows])
-            for topic, values, unit in (
-                ("/motor/position", run.theta, "rad"),
-                ("/motor/velocity", run.theta_dot, "rad_s"),
-                ("/torque/command", run.tau_command, "nm"),
-                ("/torque/acting", run.tau_osc, "nm"),
-                ("/torque/spring", run.tau_sea, "nm"),
-                ("/torque/motor", run.tau_motor, "nm"),
-            ):
-                names = [f"{joint}_{unit}" for joint in run.joints]
-                recorder.write_signal(topic, names, time, values=values[rows])
-            for topic, columns in (
-                ("/delay", _ages(run, rows)),
-                ("/energy", _energies(run, rows)),
-                ("/work", _works(run, rows)),
-                ("/power/port", _port_powers(run, rows, rates)),
-                ("/contact", _contacts(run, rows)),
-            ):
-                if columns:
-                    values = np.column_stack(list(columns.values()))
-                    recorder.write_signal(topic, list(columns), time, values=values)
+            for topic, columns in run.signals(rows).items():
+                values = np.column_stack(list(columns.values()))
+                recorder.write_signal(topic, list(columns), time, values=values)
             recorder.write_transforms(frames, time, _poses(robot, frames, run.q[rows]))
             if progress is not None:
                 progress(float(time[-1]))
         recorder.note("end", {"outcome": run.outcome.value, "message": run.message})
     assert recorder.saved is not None
     return recorder.saved
-
-
-def _ages(run: Run, rows: slice) -> dict[str, Array]:
-    return {"measurement_s": run.measurement_age[rows], "command_s": run.command_age[rows]}
-
-
-def _energies(run: Run, rows: slice) -> dict[str, Array]:
-    """What is stored, and what the books of the first law leave open."""
-    books = run.audit
-    named = {
-        **books.stores,
-        "controller": books.controller_storage,
-        "tank": books.tank,
-        "delay_line": books.delay_storage,
-        "residual": books.residual,
-    }
-    return {f"{name}_j": values[rows] for name, values in named.items() if values is not None}
-
-
-def _works(run: Run, rows: slice) -> dict[str, Array]:
-    """Works since the start by mechanism, and the slack of each passivity observer."""
-    books = run.audit
-    sides = {
-        "joint_side_slack": books.joint_side,
-        "controller_side_slack": books.controller_side,
-        "delay_side_slack": books.delay_side,
-    }
-    named = {
-        **books.scalar_flows,
-        "inertia_shaping": books.inertia_shaping,
-        "delay_injection": books.delay_injection,
-        "law_injection": books.law_injection,
-        **{name: None if side is None else side.slack for name, side in sides.items()},
-    }
-    works = {name: works[rows].sum(axis=1) for name, works in books.joint_flows.items()}
-    works |= {name: values[rows] for name, values in named.items() if values is not None}
-    return {f"{name}_j": values for name, values in works.items()}
-
-
-def _port_powers(run: Run, rows: slice, rates: Array) -> dict[str, Array]:
-    """What the springs give the links."""
-    powers = (run.tau_sea[rows] * rates).T
-    return {f"{joint}_w": power for joint, power in zip(run.joints, powers, strict=True)}
-
-
-def _contacts(run: Run, rows: slice) -> dict[str, Array]:
-    """Mode (0 open, 1 sticking, 2 slipping) and force of each contact point."""
-    columns: dict[str, Array] = {}
-    for point, foot in enumerate(run.feet):
-        number = run.feet[:point].count(foot)
-        name = f"{foot}_{number}" if run.feet.count(foot) > 1 else foot
-        columns[f"{name}_mode"] = run.contact_mode[rows, point].astype(float)
-        for axis, way in enumerate(("tangent_1", "tangent_2", "normal")):
-            columns[f"{name}_{way}_n"] = run.contact_force[rows, point, axis]
-    return columns
 
 
 def _poses(robot: Robot, frames: Sequence[str], q: Array) -> Array:

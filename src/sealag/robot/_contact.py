@@ -9,6 +9,9 @@ import numpy as np
 from sealag.errors import MotionError
 from sealag.typing import Array, IntArray
 
+_BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
+_BASE_RATES = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
+
 
 class ContactKind(StrEnum):
     """What a contact holds still: a point (3 rows) or a whole frame (6 rows)."""
@@ -76,6 +79,28 @@ class Motion:
             raise MotionError(f"The motion's time does not increase at instant {at}.")
         if self.contact_index.min() < 0 or self.contact_index.max() >= len(self.contact_sets):
             raise MotionError("The motion's contact index names a contact set that is not there.")
+
+    @staticmethod
+    def position_columns(joints: Sequence[str], *, floating_base: bool) -> tuple[str, ...]:
+        """Return what the columns of q are called in tables: base_x … base_qw and the joints.
+
+        Args:
+            joints: their names.
+            floating_base: whether the base moves too.
+        """
+        return (*(_BASE if floating_base else ()), *joints)
+
+    @staticmethod
+    def velocity_columns(joints: Sequence[str], *, floating_base: bool) -> tuple[str, ...]:
+        """Return what the columns of v are called in tables: base_vx … base_wz in the base frame,
+        and `<joint>:velocity`.
+
+        Args:
+            joints: their names.
+            floating_base: whether the base moves too.
+        """
+        rates = (f"{joint}:velocity" for joint in joints)
+        return (*(_BASE_RATES if floating_base else ()), *rates)
 
     def __len__(self) -> int:
         """Return the number of instants."""

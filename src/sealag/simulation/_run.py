@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sealag.extras import extra
+from sealag.robot import Motion
 from sealag.simulation._audit import Audit
 from sealag.simulation._delay_store import delay_store
 from sealag.simulation._exchange import Ages
@@ -97,6 +99,63 @@ class Run:
                     value = getattr(part, name)
                     release(*value.values() if isinstance(value, dict) else [value])
 
+    def signals(self, rows: slice = slice(None)) -> dict[str, dict[str, Array]]:
+        """Return what a recording holds besides joint states and poses of links.
+
+        Args:
+            rows: Of which logged instants.
+
+        Returns:
+            By topic, such as ``/torque/command``, the columns by name, each (N,), with the unit at
+            the end of the name.
+        """
+        by_joint = {
+            "/motor/position": (self.theta, "rad"),
+            "/motor/velocity": (self.theta_dot, "rad_s"),
+            "/torque/command": (self.tau_command, "nm"),
+            "/torque/acting": (self.tau_osc, "nm"),
+            "/torque/spring": (self.tau_sea, "nm"),
+            "/torque/motor": (self.tau_motor, "nm"),
+        }
+        found = {
+            topic: self._by_joint(values[rows], unit) for topic, (values, unit) in by_joint.items()
+        }
+        rates = self.v[rows, -len(self.joints) :]
+        found |= {
+            "/delay": _ages(self, rows),
+            "/energy": _energies(self, rows),
+            "/work": _works(self, rows),
+            "/power/port": self._by_joint(self.tau_sea[rows] * rates, "w"),  # to the links
+            "/contact": _contacts(self, rows),
+        }
+        return {topic: columns for topic, columns in found.items() if columns}
+
+    def _by_joint(self, values: Array, unit: str) -> dict[str, Array]:
+        return {f"{joint}_{unit}": one for joint, one in zip(self.joints, values.T, strict=True)}
+
+    def to_pandas(self) -> Any:
+        """Return the run as a DataFrame of pandas, a row a logged instant.
+
+        Configurations and velocities are named as in a motion file, ``base_x … base_qw``, the
+        joints, ``base_vx … base_wz`` and ``<joint>:velocity``, so that its CSV is one; the rest by
+        topic and name of the recording, such as ``torque/command/left_knee_nm``. All of it is read
+        into memory.
+
+        Returns:
+            The DataFrame; its index is ``time_s``.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        pandas = extra("pandas", use="Run.to_pandas")
+        floating = self.q.shape[1] > len(self.joints)
+        positions = Motion.position_columns(self.joints, floating_base=floating)
+        rates = Motion.velocity_columns(self.joints, floating_base=floating)
+        columns = dict(zip((*positions, *rates), (*self.q.T, *self.v.T), strict=True))
+        for topic, signals in self.signals().items():
+            columns |= {f"{topic[1:]}/{name}": values for name, values in signals.items()}
+        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time_s"))
+
     def summary(self, *, recording: Path) -> dict[str, Any]:
         """Return what it comes to: the numbers of its JSON answer.
 
@@ -133,6 +192,55 @@ class Run:
             "tank_j": float(books.tank[-1]) if books.tank is not None else None,
             "touchdowns": sum(event.kind.value == "touchdown" for event in self.events),
         }
+
+
+def _ages(run: Run, rows: slice) -> dict[str, Array]:
+    return {"measurement_s": run.measurement_age[rows], "command_s": run.command_age[rows]}
+
+
+def _energies(run: Run, rows: slice) -> dict[str, Array]:
+    """What is stored, and what the books of the first law leave open."""
+    books = run.audit
+    named = {
+        **books.stores,
+        "controller": books.controller_storage,
+        "tank": books.tank,
+        "delay_line": books.delay_storage,
+        "residual": books.residual,
+    }
+    return {f"{name}_j": values[rows] for name, values in named.items() if values is not None}
+
+
+def _works(run: Run, rows: slice) -> dict[str, Array]:
+    """Works since the start by mechanism, and the slack of each passivity observer."""
+    books = run.audit
+    sides = {
+        "joint_side_slack": books.joint_side,
+        "controller_side_slack": books.controller_side,
+        "delay_side_slack": books.delay_side,
+    }
+    named = {
+        **books.scalar_flows,
+        "inertia_shaping": books.inertia_shaping,
+        "delay_injection": books.delay_injection,
+        "law_injection": books.law_injection,
+        **{name: None if side is None else side.slack for name, side in sides.items()},
+    }
+    works = {name: works[rows].sum(axis=1) for name, works in books.joint_flows.items()}
+    works |= {name: values[rows] for name, values in named.items() if values is not None}
+    return {f"{name}_j": values for name, values in works.items()}
+
+
+def _contacts(run: Run, rows: slice) -> dict[str, Array]:
+    """Mode (0 open, 1 sticking, 2 slipping) and force of each contact point."""
+    columns: dict[str, Array] = {}
+    for point, foot in enumerate(run.feet):
+        number = run.feet[:point].count(foot)
+        name = f"{foot}_{number}" if run.feet.count(foot) > 1 else foot
+        columns[f"{name}_mode"] = run.contact_mode[rows, point].astype(float)
+        for axis, way in enumerate(("tangent_1", "tangent_2", "normal")):
+            columns[f"{name}_{way}_n"] = run.contact_force[rows, point, axis]
+    return columns
 
 
 def _largest(values: Array | None) -> float | None:

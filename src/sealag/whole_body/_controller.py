@@ -18,8 +18,8 @@ class Controller:
 
     The configuration that x and all matrices are taken at is moved from the measured one along
     the contact-consistent motions by the difference between the fed-back joint angles and the
-    measured ones. A robot's driver calls it exactly as the simulator does; after the first tick no
-    memory is allocated that outlives a tick.
+    measured ones. `System.controller()` makes a design's. A robot's driver calls it exactly as the
+    simulator does; after the first tick no memory is allocated that outlives a tick.
     """
 
     def __init__(

@@ -146,6 +146,9 @@ class FrozenLoop(DelayedLoop):
             return found
         return replace(found, delay=0.0, unstable_roots=drifting, guaranteed=False)
 
+    def _state_names(self) -> tuple[str, ...]:
+        return self.states
+
     def channels(self) -> dict[str, float]:
         """Return the exact margin, s, if one channel of the command is late and the other is not.
 

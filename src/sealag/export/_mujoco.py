@@ -11,7 +11,7 @@ import numpy as np
 from sealag.constants import GRAVITY
 from sealag.design import System
 from sealag.errors import InputError
-from sealag.report._mujoco_delays import StepCounts
+from sealag.export._mujoco_delays import StepCounts
 from sealag.robot import ContactKind
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body import Rest
