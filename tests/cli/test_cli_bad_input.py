@@ -223,7 +223,7 @@ URDFS = {
     "negative inertia": (arm(body(ixx="-1")), "link b"),
     "almost no inertia": (arm(body(mass="1e-12", ixx="1e-15").replace("0.01", "1e-15")), "joint j"),
     "no limit": (arm(limit=""), "limits"),
-    "limits swapped": (arm(limit='lower="1" upper="-1"'), "lower"),
+    "SDF": ('<sdf version="1.6"/>', "convert it to a URDF"),
     "odd type": (arm(kind="hinge"), "hinge"),
     "zero axis": (arm().replace("0 1 0", "0 0 0"), "axis of joint j"),
     "link twice": (arm(more='<link name="a"/>'), "2 links"),

@@ -39,6 +39,9 @@ class Robot:
         joints: (n) names of the actuated joints, in the order of all arrays.
         followers: joints that move with one of `joints` and have no coordinate, by name. All terms
             (M, g, Jacobians, ...) are those of the coupled robot.
+        skipped: why a joint that moves cannot have an actuator, by its name; empty unless
+            `load_robot` was to skip such joints.
+        remarks: what is read otherwise than the file says it, a sentence each.
         position_lower: (n,) rad or m, -inf where there is none; the followers' limits count.
         position_upper: (n,) rad or m, inf where there is none; the followers' limits count.
         sliding: (n,) whether a joint is prismatic, with positions in m.
@@ -65,6 +68,8 @@ class Robot:
     floating_base: bool
     joints: tuple[str, ...]
     followers: Mapping[str, Follower]
+    skipped: Mapping[str, str]
+    remarks: tuple[str, ...]
     position_lower: Array
     position_upper: Array
     sliding: BoolArray
@@ -232,8 +237,13 @@ class Robot:
 
     def reference_posture(self) -> ReferencePosture | None:
         """Return the posture that an SRDF beside the URDF names, one to stand in before others;
-        None if there is none."""
-        return posture_beside(self.urdf_path, self.joints)
+        None if there is none. Joints that it puts outside their limits are at the nearer one."""
+        found = posture_beside(self.urdf_path, self.joints)
+        lower, upper = (
+            dict(zip(self.joints, ends.tolist(), strict=True))
+            for ends in (self.position_lower, self.position_upper)
+        )
+        return None if found is None else found.within(lower, upper)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Return the joints' part (…, n) of configurations.

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
@@ -16,6 +16,8 @@ ROOT_JOINT = "root_joint"
 LEAST_INERTIA = 1e-9  # kg m², kg: of what an actuated joint moves
 _RESERVED = ("", ROOT_JOINT, "universe")
 _ENDS = ("lower", "upper")
+_LINK = ("inertial",)
+_JOINT = ("parent", "child", "origin", "axis", "limit", "dynamics", "mimic")
 _ENTRIES = ("ixx", "ixy", "ixz", "ixy", "iyy", "iyz", "ixz", "iyz", "izz")
 _INDEFINITE = 1e-6  # of a body's inertia: what rounding in a URDF does to a principal moment
 _PLACEHOLDER = 0.2  # of a body's inertia: sensors and covers fixed to public robots reach 0.15
@@ -35,10 +37,6 @@ def check_urdf(root: Element, path: Path) -> None:
             names it, its numbers and a remedy.
         UnknownNameError: a joint names a link that does not exist.
     """
-    if any("xacro" in element.tag for element in root.iter()):
-        raise RobotError(
-            f"{path} is a xacro file; expand it first: xacro {path.name} > robot.urdf."
-        )
     if root.tag != "robot" or root.find("link") is None:
         raise RobotError(f"{path} is not a URDF: it needs a <robot> with at least one <link>.")
     if root.find("joint") is None:
@@ -52,6 +50,50 @@ def check_urdf(root: Element, path: Path) -> None:
         for inertial in link.iterfind("inertial"):
             _check_origin(inertial, f"<inertial> of link {link.get('name')}", path)
     _check_inertias(root, path)
+
+
+def swap_limits(root: Element) -> tuple[str, ...]:
+    """Exchange position limits whose lower one is the larger: they can only mean the same range.
+
+    Args:
+        root: the URDF's root element, which is changed.
+
+    Returns:
+        A sentence for each joint.
+    """
+    said = []
+    for joint in root.iterfind("joint"):
+        limit = joint.find("limit")
+        if limit is None:
+            continue
+        lower, upper = (limit.get(key, "0") for key in _ENDS)
+        if number(lower) > number(upper):
+            limit.set("lower", upper)
+            limit.set("upper", lower)
+            said.append(
+                f"The limits of joint {joint.get('name', '')} are {lower} … {upper} in the file "
+                f"and are read as {upper} … {lower}."
+            )
+    return tuple(said)
+
+
+def kinematics(root: Element, name: str) -> Element:
+    """Return a URDF with what a model of the dynamics needs and nothing else.
+
+    Visuals, collisions, materials, transmissions and what other tools write into the file may be of
+    any form.
+
+    Args:
+        root: the URDF's root element.
+        name: of the robot if the file gives none.
+    """
+    plain = Element("robot", name=root.get("name") or name)
+    for tag, kept in (("link", _LINK), ("joint", _JOINT)):
+        for element in root.iterfind(tag):
+            own = {key: element.attrib[key] for key in ("name", "type") if key in element.attrib}
+            copy = SubElement(plain, tag, own)
+            copy.extend(part for part in element if part.tag in kept)
+    return plain
 
 
 def number(text: str) -> float:
@@ -133,13 +175,7 @@ def _check_tree(root: Element, path: Path) -> None:
 
 
 def _check_joint(joint: Element, path: Path) -> None:
-    name, limit, axis = joint.get("name", ""), joint.find("limit"), joint.find("axis")
-    lower, upper = (limit.get(key, "0") if limit is not None else "0" for key in _ENDS)
-    if number(lower) > number(upper):
-        raise RobotError(
-            f"{path}: the limits of joint {name} are {lower} … {upper}; the lower one must "
-            "come first."
-        )
+    name, axis = joint.get("name", ""), joint.find("axis")
     ways = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
     if joint.get("type") != "fixed" and not any(map(number, ways.split())):
         raise RobotError(f"{path}: the axis of joint {name} is zero; it needs a direction.")
