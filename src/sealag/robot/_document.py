@@ -7,6 +7,7 @@ from xml.parsers import expat
 
 from sealag.errors import RobotError
 from sealag.files import read_whole
+from sealag.robot._xacro import expand_xacro
 
 LARGEST_URDF_BYTES = 50_000_000
 _SDF = ("sdf", "gazebo", "world", "model")
@@ -18,7 +19,7 @@ class Document(NamedTuple):
 
     Attributes:
         root: its root element; names keep their prefixes (`drake:acceleration`).
-        content: its bytes.
+        content: its bytes, macros expanded.
     """
 
     root: Element
@@ -26,23 +27,23 @@ class Document(NamedTuple):
 
 
 def read_document(path: Path) -> Document:
-    """Read a URDF.
+    """Read a URDF, or a xacro file as the URDF that it expands to.
 
     Args:
         path: the file.
 
     Raises:
         FileError: it is missing, unreadable or too large.
-        RobotError: it is empty, no XML, or of a kind that is not read.
+        RobotError: it is empty, no XML, or of a kind that is not read; its macros cannot be
+            expanded.
     """
     content = read_whole(path, what="The URDF", largest=LARGEST_URDF_BYTES)
     if not content.strip():
         raise RobotError(f"{path} is empty; a URDF is needed.")
     root = parse_xml(content, path)
-    if is_xacro(root):
-        raise RobotError(
-            f"{path} is a xacro file; expand it first: xacro {path.name} > robot.urdf."
-        )
+    if _has_macros(root):
+        content = expand_xacro(path)
+        root = parse_xml(content, path)
     if root.tag in _SDF:
         raise RobotError(
             f"{path} is SDF, which is not read; convert it to a URDF, for instance with sdf2urdf "
@@ -70,19 +71,9 @@ def parse_xml(content: bytes, path: Path) -> Element:
     return builder.close()
 
 
-def is_xacro(root: Element) -> bool:
-    """Whether a file has macros left to expand.
-
-    Args:
-        root: its root element.
-    """
-    prefixes = {"xacro"}
-    for element in root.iter():
-        for key, value in element.attrib.items():
-            if key.startswith("xmlns:") and "xacro" in value:
-                prefixes.add(key.removeprefix("xmlns:"))
-            if "${" in value:
-                return True
-        if element.tag.partition(":")[0] in prefixes and ":" in element.tag:
-            return True
-    return False
+def _has_macros(root: Element) -> bool:
+    """Whether a file has macros of xacro left to expand."""
+    return any(
+        element.tag.startswith("xacro:") or any("${" in value for value in element.attrib.values())
+        for element in root.iter()
+    )
