@@ -2,14 +2,15 @@
 
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 from sealag.errors import RobotError
 from sealag.files import read_whole
+from sealag.robot._mjcf import include_files, urdf_of_mjcf
 from sealag.robot._xacro import expand_xacro
+from sealag.robot._xml import LARGEST_BYTES, parse_xml
 
-LARGEST_URDF_BYTES = 50_000_000
 _SDF = ("sdf", "gazebo", "world", "model")
 """Root elements of SDF and of the files beside it."""
 
@@ -18,8 +19,9 @@ class Document(NamedTuple):
     """A robot's file.
 
     Attributes:
-        root: its root element; names keep their prefixes (`drake:acceleration`).
-        content: its bytes, macros expanded.
+        root: root element of the URDF that it is or is translated to; names keep their prefixes
+            (`drake:acceleration`).
+        content: its bytes, with macros expanded and included files in their places.
     """
 
     root: Element
@@ -27,7 +29,7 @@ class Document(NamedTuple):
 
 
 def read_document(path: Path) -> Document:
-    """Read a URDF, or a xacro file as the URDF that it expands to.
+    """Read a URDF, or a xacro or MJCF file as the URDF that it is translated to.
 
     Args:
         path: the file.
@@ -37,38 +39,23 @@ def read_document(path: Path) -> Document:
         RobotError: it is empty, no XML, or of a kind that is not read; its macros cannot be
             expanded.
     """
-    content = read_whole(path, what="The URDF", largest=LARGEST_URDF_BYTES)
+    content = read_whole(path, what="The URDF", largest=LARGEST_BYTES)
     if not content.strip():
         raise RobotError(f"{path} is empty; a URDF is needed.")
     root = parse_xml(content, path)
     if _has_macros(root):
         content = expand_xacro(path)
         root = parse_xml(content, path)
+    if root.tag == "mujoco":
+        if include_files(root, path):
+            content = ElementTree.tostring(root)
+        root = urdf_of_mjcf(root, path)
     if root.tag in _SDF:
         raise RobotError(
-            f"{path} is SDF, which is not read; convert it to a URDF, for instance with sdf2urdf "
-            "or by exporting it from its CAD program again."
+            f"{path} is SDF, which is not read; convert it to a URDF, for instance with sdf2urdf, "
+            "or export one from where it comes from."
         )
     return Document(root, content)
-
-
-def parse_xml(content: bytes, path: Path) -> Element:
-    """Parse XML without regard to namespaces: prefixes need not be declared, as in many URDFs.
-
-    Args:
-        content: the file's bytes.
-        path: what messages call it.
-
-    Raises:
-        RobotError: it is not well-formed.
-    """
-    builder, parser = TreeBuilder(), expat.ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
-    try:
-        parser.Parse(content, True)
-    except (expat.ExpatError, ValueError, LookupError) as error:  # the last two: odd encodings
-        raise RobotError(f"{path} is not well-formed XML: {error}.") from error
-    return builder.close()
 
 
 def _has_macros(root: Element) -> bool:

@@ -17,7 +17,14 @@ import pinocchio as pin
 from sealag.errors import RobotError, SealagError, near
 from sealag.robot._document import read_document
 from sealag.robot._mimic import Coupling, Follower, read_followers
-from sealag.robot._urdf import LEAST_INERTIA, ROOT_JOINT, check_urdf, kinematics, swap_limits
+from sealag.robot._urdf import (
+    LEAST_INERTIA,
+    ROOT_JOINT,
+    check_urdf,
+    joint_dynamics,
+    kinematics,
+    swap_limits,
+)
 from sealag.typing import Array
 
 _LOG = "libconsole_bridge.so.1.0"
@@ -39,6 +46,7 @@ class Description(NamedTuple):
         model: the Pinocchio model with all movable joints, mimic joints too.
         followers: its mimic joints by name.
         astray: why a mimic joint follows nothing, by name: it can only be locked.
+        rotors: reflected rotor inertia by joint name; it is not in the model.
         remarks: what is read otherwise than it is written, a sentence each.
         sha256: of the file.
     """
@@ -46,6 +54,7 @@ class Description(NamedTuple):
     model: Any
     followers: dict[str, Follower]
     astray: dict[str, SealagError]
+    rotors: dict[str, float]
     remarks: tuple[str, ...]
     sha256: str
 
@@ -76,7 +85,11 @@ def read_model(path: Path, *, floating_base: bool) -> Description:
     text = ElementTree.tostring(kinematics(root, path.stem), encoding="unicode")
     model = _build(text, path, floating_base=floating_base)
     _check_bodies(model, path)
-    return Description(model, followers, astray, remarks, hashlib.sha256(content).hexdigest())
+    rotors = {j.get("name", ""): joint_dynamics(j).armature for j in root.iterfind("joint")}
+    return Description(
+        model=model, followers=followers, astray=astray, rotors=rotors, remarks=remarks,
+        sha256=hashlib.sha256(content).hexdigest(),
+    )  # fmt: skip
 
 
 def _build(text: str, path: Path, *, floating_base: bool) -> Any:

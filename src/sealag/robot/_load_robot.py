@@ -81,7 +81,7 @@ def load_robot(
         sliding=np.array([model.joints[model.getJointId(j)].shortname()[10] == "P" for j in names]),
         velocity_limit=_limit(model.velocityLimit[-count:][coupling.own]),
         effort_limit=_limit(model.effortLimit[-count:][coupling.own]),
-        rotor_inertia=np.square(ratio).T @ model.armature[-count:],
+        rotor_inertia=np.square(ratio).T @ [said.rotors[name] for name in every],
         damping=np.square(ratio).T @ model.damping[-count:],
         friction=ratio.T @ model.upperDryFrictionLimit[-count:],
         mass=float(sum(inertia.mass for inertia in model.inertias[1:])),

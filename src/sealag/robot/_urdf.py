@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -108,16 +109,29 @@ def number(text: str) -> float:
         return math.nan
 
 
-def joint_dynamics(joint: Element) -> tuple[float, float]:
-    """Return viscous damping and Coulomb friction of a joint, 0 where the URDF gives none.
+class JointDynamics(NamedTuple):
+    """What <dynamics> of a joint says, 0 where it says nothing.
+
+    Attributes:
+        damping: viscous, Nms/rad or Ns/m.
+        friction: Coulomb, Nm or N.
+        armature: reflected rotor inertia, kg m² or kg; MJCF has it, and some URDFs.
+    """
+
+    damping: float
+    friction: float
+    armature: float
+
+
+def joint_dynamics(joint: Element) -> JointDynamics:
+    """Return what <dynamics> of a joint says.
 
     Args:
         joint: the joint's element.
     """
     given = joint.find("dynamics")
-    if given is None:
-        return 0.0, 0.0
-    return number(given.get("damping", "0")), number(given.get("friction", "0"))
+    said = {} if given is None else given.attrib
+    return JointDynamics(*(number(said.get(key, "0")) for key in JointDynamics._fields))
 
 
 def _check_names(root: Element, path: Path) -> None:
@@ -179,7 +193,7 @@ def _check_joint(joint: Element, path: Path) -> None:
     ways = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
     if joint.get("type") != "fixed" and not any(map(number, ways.split())):
         raise RobotError(f"{path}: the axis of joint {name} is zero; it needs a direction.")
-    for what, value in zip(("damping", "friction"), joint_dynamics(joint), strict=True):
+    for what, value in joint_dynamics(joint)._asdict().items():
         if not 0.0 <= value <= _MOST_DAMPING:
             raise RobotError(
                 f"{path}: the {what} of joint {name} is {value:g}; <dynamics> needs a number in "
