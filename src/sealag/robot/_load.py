@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+from sealag.constants import GRAVITY
 from sealag.errors import RobotError, SealagError, near
 from sealag.robot._document import read_document
 from sealag.robot._mimic import Coupling, Follower, read_followers
@@ -30,11 +31,9 @@ from sealag.typing import Array
 _LOG = "libconsole_bridge.so.1.0"
 _SET_LOG_LEVEL = "_ZN14console_bridge11setLogLevelENS_8LogLevelE"  # setLogLevel(LogLevel) in C++
 _LOG_NOTHING = 4  # CONSOLE_BRIDGE_LOG_NONE
-SEVERAL = (
-    "has more than one degree of freedom; actuated joints must be revolute, continuous or prismatic"
-)
-"""Why a joint cannot have an actuator."""
-
+_ACTUATED = {f"JointModel{kind}" for kind in ("RX", "RY", "RZ", "RevoluteUnaligned", "PX", "PY",
+                                             "PZ", "PrismaticUnaligned")}  # fmt: skip
+"""Pinocchio's revolute and prismatic joints, whose position is one number."""
 _ROUNDED = 0.05  # of the largest moment: what two significant digits do to a plate's
 _SINGULAR = 1e-9  # least eigenvalue of the mass matrix scaled to a unit diagonal
 
@@ -89,6 +88,45 @@ def read_model(path: Path, *, floating_base: bool) -> Description:
     return Description(
         model=model, followers=followers, astray=astray, rotors=rotors, remarks=remarks,
         sha256=hashlib.sha256(content).hexdigest(),
+    )  # fmt: skip
+
+
+def describe_model(model: Any, *, floating_base: bool) -> Description:
+    """Describe a Pinocchio model, which stays as it is.
+
+    Args:
+        model: the `pinocchio.Model`.
+        floating_base: whether its first joint, a free flyer, is the base's.
+
+    Raises:
+        RobotError: it has no free base and should have one, mimics, another gravity, or a body that
+            cannot be.
+    """
+    path = Path(model.name or "model")
+    own = pin.Model(model)
+    gravity = own.gravity.vector
+    if not np.allclose(gravity, [0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0]):
+        raise RobotError(f"{path}: the model's gravity is {gravity[:3]}; it must be 0 0 -9.81.")
+    for name, joint in list(zip(own.names, own.joints))[1:]:
+        if joint.nv == 0:
+            raise RobotError(
+                f"{path}: joint {name} is one of Pinocchio's mimic joints, which are not read; "
+                "give the URDF, whose mimic joints are."
+            )
+    if _has_free_base(own):
+        own = _named_base(own) if floating_base else _lock(own, [1], pin.neutral(own))
+    elif floating_base:
+        raise RobotError(
+            f"{path}: the model has no free base; build it with pinocchio.JointModelFreeFlyer(), "
+            "or let floating_base be False."
+        )
+    _check_bodies(own, path)
+    joints = list(zip(own.names, own.joints))[1:]
+    rotors = {str(name): float(own.armature[joint.idx_v]) for name, joint in joints}
+    own.armature = np.zeros(own.nv)
+    return Description(
+        model=own, followers={}, astray={}, rotors=rotors, remarks=(),
+        sha256=hashlib.sha256(model.saveToString().encode()).hexdigest(),
     )  # fmt: skip
 
 
@@ -269,9 +307,24 @@ def reduce_model(
             locked.append(number)
     reduced = _lock(model, locked, at) if locked else model
     for name in names:
-        if reduced.joints[reduced.getJointId(name)].nv != 1:
-            raise RobotError(f"{path}: joint {name} {SEVERAL}.")
+        problem = not_actuated(reduced.joints[reduced.getJointId(name)])
+        if problem:
+            raise RobotError(f"{path}: joint {name} {problem}.")
     return reduced, driven
+
+
+def not_actuated(joint: Any) -> str:
+    """Return why a joint of a model cannot have an actuator; empty if it can.
+
+    Args:
+        joint: Pinocchio's model of it.
+    """
+    must = "actuated joints must be revolute, continuous or prismatic"
+    if joint.nv != 1:
+        return f"has more than one degree of freedom; {must}"
+    if joint.shortname() not in _ACTUATED:
+        return f"is a {joint.shortname()} of Pinocchio; {must}, with a position of one number"
+    return ""
 
 
 def _actuated(said: Description, path: Path, *, actuated: Sequence[str] | None) -> list[str]:

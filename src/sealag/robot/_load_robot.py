@@ -1,13 +1,13 @@
-"""From a URDF to a robot."""
+"""From a file or a model to a robot."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 
-from sealag.errors import RobotError
 from sealag.robot._find import resolve_urdf
-from sealag.robot._load import check_inertias, read_model, reduce_model
+from sealag.robot._load import check_inertias, describe_model, read_model, reduce_model
 from sealag.robot._mimic import UNLIMITED, couple, position_limits
 from sealag.robot._robot import Robot
 from sealag.robot._usable import Usable, usable_joints
@@ -15,14 +15,17 @@ from sealag.typing import Array
 
 
 def load_robot(
-    urdf: str | Path,
+    urdf: str | Path | pin.Model,
     *,
     floating_base: bool,
     actuated: Sequence[str] | None = None,
     relative_to: Path = Path(),
     skip_unusable: bool = False,
 ) -> Robot:
-    """Read a robot from a URDF; meshes are not needed.
+    """Read a robot from a URDF, a xacro or MJCF file, or a Pinocchio model; meshes are not needed.
+
+    What kind of file it is, its content tells. Xacro files are expanded by the package xacro, with
+    their arguments' defaults. MJCF files need <inertial> in their bodies.
 
     Names with undeclared prefixes (`drake:acceleration`) and all that is not of the dynamics are
     passed over. Position limits whose lower one is the larger are exchanged, and the robot's
@@ -31,7 +34,8 @@ def load_robot(
     Args:
         urdf: a path, `bundled:hume.urdf`, `example-robot-data:<path below robots>`, or
             `package://<ROS package>/<path>`: the package is looked for in ROS_PACKAGE_PATH, in
-            AMENT_PREFIX_PATH, and in the folders around the file that names it.
+            AMENT_PREFIX_PATH, and in the folders around the file that names it. Or a
+            `pinocchio.Model`, which is copied; its gravity is 9.81 m/s².
         floating_base: whether the root link moves freely. Where the file's own root joint is
             floating, that joint is the base's; it is locked if this is False.
         actuated: names of the actuated joints; the other movable joints are locked at their
@@ -46,20 +50,23 @@ def load_robot(
 
     Raises:
         FileError: the file cannot be read.
-        RobotError: it is not a URDF of a robot with physical inertias and joints of one degree of
-            freedom, an actuated joint mimics another one, or moves almost no inertia.
+        RobotError: it is no robot with physical inertias and joints of one degree of freedom, an
+            actuated joint mimics another one, or moves almost no inertia; it is SDF, or MJCF with
+            something that is not read.
         UnknownNameError: an actuated joint, a bundled robot, or a link or joint that a joint of the
             URDF names does not exist.
     """
-    path = resolve_urdf(str(urdf), relative_to=relative_to)
-    said = read_model(path, floating_base=floating_base)
+    if isinstance(urdf, pin.Model):
+        file, path = None, Path(urdf.name or "the model")
+        said = describe_model(urdf, floating_base=floating_base)
+    else:
+        file = path = resolve_urdf(str(urdf), relative_to=relative_to)
+        said = read_model(path, floating_base=floating_base)
     usable = Usable([], {})
     if skip_unusable and actuated is None:
         usable = usable_joints(said, path)
         actuated = usable.joints
     model, followers = reduce_model(said, path, actuated=actuated)
-    if model.nq - model.nv != (1 if floating_base else 0):
-        raise RobotError(f"{path}: a joint's position is not one number; that is not supported.")
     coupling = couple(model, followers)
     check_inertias(model, coupling, path)
     count, n = len(coupling.offset), len(coupling.own)
@@ -69,7 +76,7 @@ def load_robot(
     ratio = np.abs(coupling.T[-count:, -n:])
     return Robot(
         name=model.name,
-        urdf_path=path,
+        urdf_path=file,
         urdf_sha256=said.sha256,
         floating_base=floating_base,
         joints=names,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from sealag.robot._load import SEVERAL, Description, reduce_model, weak_joints
+from sealag.robot._load import Description, not_actuated, reduce_model, weak_joints
 from sealag.robot._mimic import couple
 from sealag.robot._urdf import ROOT_JOINT
 
@@ -36,8 +36,9 @@ def usable_joints(said: Description, path: Path) -> Usable:
     skipped = {name: str(error).rstrip(".") for name, error in said.astray.items()}
     model = said.model
     for name in said.movable:
-        if name not in said.followers and model.joints[model.getJointId(name)].nv != 1:
-            skipped[name] = SEVERAL
+        problem = not_actuated(model.joints[model.getJointId(name)])
+        if problem and name not in said.followers:
+            skipped[name] = problem
     while True:
         names = [name for name in said.movable if name not in {**skipped, **said.followers}]
         reduced, followers = reduce_model(said, path, actuated=names)
