@@ -221,7 +221,10 @@ URDFS = {
     "comma in a mass": (arm(body(mass="1,5")), "link b"),
     "NaN inertia": (arm(body(ixx="nan")), "ixx"),
     "negative inertia": (arm(body(ixx="-1")), "link b"),
-    "almost no inertia": (arm(body(mass="1e-12", ixx="1e-15").replace("0.01", "1e-15")), "almost no inertia"),
+    "almost no inertia": (
+        arm(body(mass="1e-12", ixx="1e-15").replace("0.01", "1e-15")),
+        "almost no inertia",
+    ),
     "massless base": (arm(), "link a has almost no inertia"),
     "no limit": (arm(limit=""), "limits"),
     "SDF": ('<sdf version="1.6"/>', "convert it to a URDF"),
