@@ -4,7 +4,7 @@ BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help setup paper test quick fuzz mutants bench lint wheel wheel-check clean
+.PHONY: help setup paper test quick fuzz mutants corpus bench lint wheel wheel-check clean
 
 help:
 	@echo "make paper   compute the paper's figures and claims into out/paper/"
@@ -12,6 +12,7 @@ help:
 	@echo "make quick   the same without the tests marked slow"
 	@echo "make fuzz    fresh mutations of projects and robots for MINUTES=60, any SEED=n"
 	@echo "make mutants falsify answers one by one, and see that a test notices (an hour); ROOM=delay for one room"
+	@echo "make corpus  take every robot below FOLDER=… through sealag, into OUT=out/corpus.md; ONLY=--read reads them"
 	@echo "make wheel-check  build sdist and wheel, install and use the wheel in a fresh environment"
 	@echo "make bench   certificates and control ticks beside their peers, as ratios"
 	@echo "make setup   build .venv only (the other commands do this by themselves)"
@@ -54,6 +55,12 @@ fuzz: setup
 
 mutants: setup
 	PYTHONPATH=tests $(BIN)/python -m mutants $(if $(ROOM),--room $(ROOM))
+
+FOLDER ?= $(error give FOLDER=, a folder with robots in it)
+OUT ?= out/corpus.md
+corpus: setup
+	@mkdir -p $(dir $(OUT))
+	PYTHONPATH=tests $(BIN)/python -W ignore -m corpus $(FOLDER) --out $(OUT) $(ONLY)
 
 # The wheel is built from the sdist, so that both are known to be complete.
 wheel:

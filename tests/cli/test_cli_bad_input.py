@@ -225,13 +225,17 @@ URDFS = {
     "comma in a mass": (arm(body(mass="1,5")), "link b"),
     "NaN inertia": (arm(body(ixx="nan")), "ixx"),
     "negative inertia": (arm(body(ixx="-1")), "link b"),
-    "almost no inertia": (arm(body(mass="1e-12", ixx="1e-15").replace("0.01", "1e-15")), "joint j"),
+    "almost no inertia": (
+        arm(body(mass="1e-12", ixx="1e-15").replace("0.01", "1e-15")),
+        "almost no inertia",
+    ),
+    "massless base": (arm(), "link a has almost no inertia"),
     "no limit": (arm(limit=""), "limits"),
-    "limits swapped": (arm(limit='lower="1" upper="-1"'), "lower"),
+    "SDF": ('<sdf version="1.6"/>', "convert it to a URDF"),
     "odd type": (arm(kind="hinge"), "hinge"),
     "zero axis": (arm().replace("0 1 0", "0 0 0"), "axis of joint j"),
     "link twice": (arm(more='<link name="a"/>'), "2 links"),
-    "xacro": (arm(more='<x:if xmlns:x="http://ros.org/wiki/xacro"/>'), "xacro"),
+    "xacro": (arm(more="<xacro:if/>"), "cannot be expanded by xacro"),
 }
 
 

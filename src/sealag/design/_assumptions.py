@@ -185,6 +185,8 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
             "urdf_left_out",
             f"The URDF's {', '.join(left_out)} is not used; Actuators.of_robot uses it.",
         )
+    if robot.remarks:
+        yield "urdf_reading", " ".join(robot.remarks)
     if (robot.effort_limit == 0.0).any() or (robot.velocity_limit == 0.0).any():
         zero = (robot.effort_limit == 0.0) | (robot.velocity_limit == 0.0)
         names = ", ".join(np.array(robot.joints)[zero].tolist())

@@ -97,7 +97,8 @@ class Design:
     def files(self) -> tuple[Path, ...]:
         """Every file that it was read from; none of these may be overwritten."""
         if self.source is None:
-            return (self.robot.urdf_path,)
+            urdf = self.robot.urdf_path
+            return () if urdf is None else (urdf,)
         return self.source.files
 
     @property

@@ -33,7 +33,7 @@ def starter_project(
         RobotError: it is not a usable robot.
         InputError: the path's bytes are no text.
     """
-    robot = load_robot(urdf, floating_base=floating_base)
+    robot = load_robot(urdf, floating_base=floating_base, skip_unusable=True)
     feet = _feet(robot) if floating_base else []
     rotor = robot.rotor_inertia
     known = bool((rotor > 0.0).all())
@@ -41,7 +41,7 @@ def starter_project(
         name=_text(robot.name),
         urdf=_text((str(urdf) if named is None else named).replace("\\", "/")),
         base="floating" if floating_base else "fixed",
-        actuated="\n".join(f"  {_text(name)}," for name in robot.joints),
+        actuated=_actuated(robot),
         posture=_posture(robot, feet),
         rotor=f"{rotor.min():.6g}"
         if known
@@ -72,6 +72,20 @@ def _key(name: str) -> str:
     return name if plain.isascii() and plain.isalnum() else _text(name)
 
 
+def _actuated(robot: Robot) -> str:
+    """Names of the joints, and behind a # those that cannot be actuated and what was read anew."""
+    lines = [f"  {_text(name)}," for name in robot.joints]
+    lines += [f"  # {_text(name)}: {_line(why)}; locked" for name, why in robot.skipped.items()]
+    lines += [f"  # {_line(remark)}" for remark in robot.remarks]
+    return "\n".join(lines)
+
+
+def _line(text: str) -> str:
+    """A comment: on one line, and of letters that TOML has."""
+    kept = text.encode("utf-8", "replace").decode("utf-8")
+    return "".join(letter if letter.isprintable() else " " for letter in kept)
+
+
 def _posture(robot: Robot, feet: list[str]) -> str:
     """The section's lines: base, and joints with where their values come from."""
     carrying, reference = np.zeros(robot.n, dtype=bool), robot.reference_posture()
@@ -88,7 +102,15 @@ def _posture(robot: Robot, feet: list[str]) -> str:
         '"FILL: rad"' if fill else f"{value:.4g}"
         for value, fill in zip(positions, carrying, strict=True)
     ]
-    joints = [f"{_key(name)} = {value}" for name, value in zip(robot.joints, values, strict=True)]
+    outside = {} if reference is None else reference.outside
+    notes = [
+        f"  # {outside[name]:.4g} there, outside its limits" if name in outside else ""
+        for name in robot.joints
+    ]
+    joints = [
+        f"{_key(name)} = {value}{note}"
+        for name, value, note in zip(robot.joints, values, notes, strict=True)
+    ]
     height = None if carrying.any() else _height(robot, feet, positions)
     return "\n".join([*_base(robot, feet, height), f"[posture.joints]         # {origin}", *joints])
 

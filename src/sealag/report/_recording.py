@@ -48,10 +48,9 @@ def write_run(
         "seed": str(run.seed),
     }
     frames = robot.link_names()
-    attachments = {
-        "project.toml": project.encode(),
-        robot.urdf_path.name: robot.urdf_path.read_bytes(),
-    }
+    attachments = {"project.toml": project.encode()}
+    if robot.urdf_path is not None:
+        attachments[robot.urdf_path.name] = robot.urdf_path.read_bytes()
     with McapRecorder(
         path=path, joints=run.joints, metadata=metadata, attachments=attachments,
         whole=run.outcome is not Outcome.INTERRUPTED,

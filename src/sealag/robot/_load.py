@@ -1,10 +1,10 @@
-"""Reading a URDF: finding it, checking it, locking what is not actuated."""
+"""Reading a URDF: checking it, building its model, locking what is not actuated."""
 
 import ctypes
 import hashlib
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -14,65 +14,28 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from sealag.errors import FileError, RobotError, near
-from sealag.files import bundled, is_inside, read_whole
+from sealag.constants import GRAVITY
+from sealag.errors import RobotError, SealagError, near
+from sealag.robot._document import read_document
 from sealag.robot._mimic import Coupling, Follower, read_followers
-from sealag.robot._urdf import LEAST_INERTIA, ROOT_JOINT, check_urdf, joint_dynamics
+from sealag.robot._urdf import (
+    LEAST_INERTIA,
+    ROOT_JOINT,
+    check_urdf,
+    joint_dynamics,
+    kinematics,
+    swap_limits,
+)
 from sealag.typing import Array
 
-LARGEST_URDF_BYTES = 50_000_000
 _LOG = "libconsole_bridge.so.1.0"
 _SET_LOG_LEVEL = "_ZN14console_bridge11setLogLevelENS_8LogLevelE"  # setLogLevel(LogLevel) in C++
 _LOG_NOTHING = 4  # CONSOLE_BRIDGE_LOG_NONE
+_ACTUATED = {f"JointModel{kind}" for kind in ("RX", "RY", "RZ", "RevoluteUnaligned", "PX", "PY",
+                                             "PZ", "PrismaticUnaligned")}  # fmt: skip
+"""Pinocchio's revolute and prismatic joints, whose position is one number."""
 _ROUNDED = 0.05  # of the largest moment: what two significant digits do to a plate's
 _SINGULAR = 1e-9  # least eigenvalue of the mass matrix scaled to a unit diagonal
-
-
-def example_robot_path(relative: str) -> Path:
-    """Return the path of a file of the package `example-robot-data`.
-
-    Args:
-        relative: path below its `robots` folder, such as
-            `anymal_b_simple_description/robots/anymal.urdf`.
-
-    Raises:
-        FileError: the package or the file is not there.
-    """
-    roots = [
-        Path(entry).parent / "cmeel.prefix" / "share" if leaf is None else Path(entry) / leaf
-        for entry in sys.path
-        for leaf in (None, "cmeel.prefix/share")
-    ] + [Path(sys.prefix) / "share"]
-    for root in roots:
-        folder = root / "example-robot-data" / "robots"
-        path = folder / relative
-        if is_inside(path, folder) and path.is_file():
-            return path
-    raise FileError(
-        f"The example robot {relative} is not installed; "
-        "install the Python package example-robot-data or give the path of your URDF."
-    )
-
-
-def resolve_urdf(text: str, *, relative_to: Path = Path()) -> Path:
-    """Turn the way a project file names a URDF into a path.
-
-    Args:
-        text: a path, `bundled:hume.urdf` or `example-robot-data:<path below robots>`.
-        relative_to: folder from which a relative path starts.
-
-    Raises:
-        UnknownNameError: no bundled robot has this name.
-        FileError: an example robot is not installed, or a home folder does not exist.
-    """
-    if text.startswith("bundled:"):
-        return bundled(text.removeprefix("bundled:"), ending=".urdf", what="robot")
-    if text.startswith("example-robot-data:"):
-        return example_robot_path(text.removeprefix("example-robot-data:"))
-    try:
-        return relative_to / Path(text).expanduser()
-    except RuntimeError as error:  # ~nobody
-        raise FileError(f"{text!r} names the home folder of a user who does not exist.") from error
 
 
 class Description(NamedTuple):
@@ -81,14 +44,23 @@ class Description(NamedTuple):
     Attributes:
         model: the Pinocchio model with all movable joints, mimic joints too.
         followers: its mimic joints by name.
-        dynamics: viscous damping and Coulomb friction by joint name.
+        astray: why a mimic joint follows nothing, by name: it can only be locked.
+        rotors: reflected rotor inertia by joint name; it is not in the model.
+        remarks: what is read otherwise than it is written, a sentence each.
         sha256: of the file.
     """
 
     model: Any
     followers: dict[str, Follower]
-    dynamics: dict[str, tuple[float, float]]
+    astray: dict[str, SealagError]
+    rotors: dict[str, float]
+    remarks: tuple[str, ...]
     sha256: str
+
+    @property
+    def movable(self) -> list[str]:
+        """Names of all joints that are neither fixed nor the free base."""
+        return [str(name) for name in self.model.names[1:] if name != ROOT_JOINT]
 
 
 def read_model(path: Path, *, floating_base: bool) -> Description:
@@ -103,27 +75,92 @@ def read_model(path: Path, *, floating_base: bool) -> Description:
         RobotError: it is not a URDF, or one that cannot be a robot; the message gives the reason.
         UnknownNameError: a joint names a link or joint that does not exist.
     """
-    content = read_whole(path, what="The URDF", largest=LARGEST_URDF_BYTES)
-    if not content.strip():
-        raise RobotError(f"{path} is empty; a URDF is needed.")
-    try:
-        root = ElementTree.fromstring(content)
-    except ElementTree.ParseError as error:
-        raise RobotError(f"{path} is not well-formed XML: {error}.") from error
+    root, content = read_document(path)
+    remarks = swap_limits(root)
     check_urdf(root, path)
-    followers = read_followers(root, path)
+    followers, astray = read_followers(root, path)
     for joint in root.iterfind("joint[@type='continuous']"):
         _unlimit(joint)
-    text, build = ElementTree.tostring(root, encoding="unicode"), pin.buildModelFromXML
+    text = ElementTree.tostring(kinematics(root, path.stem), encoding="unicode")
+    model = _build(text, path, floating_base=floating_base)
+    _check_bodies(model, path)
+    rotors = {j.get("name", ""): joint_dynamics(j).armature for j in root.iterfind("joint")}
+    return Description(
+        model=model, followers=followers, astray=astray, rotors=rotors, remarks=remarks,
+        sha256=hashlib.sha256(content).hexdigest(),
+    )  # fmt: skip
+
+
+def describe_model(model: Any, *, floating_base: bool) -> Description:
+    """Describe a Pinocchio model, which stays as it is.
+
+    Args:
+        model: the `pinocchio.Model`.
+        floating_base: whether its first joint, a free flyer, is the base's.
+
+    Raises:
+        RobotError: it has no free base and should have one, mimics, another gravity, or a body that
+            cannot be.
+    """
+    path = Path(model.name or "model")
+    own = pin.Model(model)
+    gravity = own.gravity.vector
+    if not np.allclose(gravity, [0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0]):
+        raise RobotError(f"{path}: the model's gravity is {gravity[:3]}; it must be 0 0 -9.81.")
+    for name, joint in list(zip(own.names, own.joints))[1:]:
+        if joint.nv == 0:
+            raise RobotError(
+                f"{path}: joint {name} is one of Pinocchio's mimic joints, which are not read; "
+                "give the URDF, whose mimic joints are."
+            )
+    if _has_free_base(own):
+        own = _named_base(own) if floating_base else _lock(own, [1], pin.neutral(own))
+    elif floating_base:
+        raise RobotError(
+            f"{path}: the model has no free base; build it with pinocchio.JointModelFreeFlyer(), "
+            "or let floating_base be False."
+        )
+    _check_bodies(own, path)
+    joints = list(zip(own.names, own.joints))[1:]
+    rotors = {str(name): float(own.armature[joint.idx_v]) for name, joint in joints}
+    own.armature = np.zeros(own.nv)
+    return Description(
+        model=own, followers={}, astray={}, rotors=rotors, remarks=(),
+        sha256=hashlib.sha256(model.saveToString().encode()).hexdigest(),
+    )  # fmt: skip
+
+
+def _build(text: str, path: Path, *, floating_base: bool) -> Any:
+    """Build a model whose first joint is the free base, or that has none.
+
+    A URDF whose root joint is floating has its base below that joint.
+    """
     _silence_parser()
     try:
-        model = build(text, pin.JointModelFreeFlyer()) if floating_base else build(text)
+        model = pin.buildModelFromXML(text)
+        if _has_free_base(model):
+            return _named_base(model) if floating_base else _lock(model, [1], pin.neutral(model))
+        if not floating_base:
+            return model
+        return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
     except Exception as error:
         reason = _parser_words(text) or " ".join(str(error).split())[:200]
         raise RobotError(f"{path} cannot be read as a robot: {reason.rstrip('.')}.") from error
-    _check_bodies(model, path)
-    dynamics = {j.get("name", ""): joint_dynamics(j) for j in root.iterfind("joint")}
-    return Description(model, followers, dynamics, hashlib.sha256(content).hexdigest())
+
+
+def _has_free_base(model: Any) -> bool:
+    """Whether all that moves hangs on a single joint that is free."""
+    alone = list(model.parents)[1:].count(0) == 1
+    return alone and model.joints[1].shortname() == pin.JointModelFreeFlyer().shortname()
+
+
+def _named_base(model: Any) -> Any:
+    """Call the free joint of a model what Pinocchio calls it; its frame too."""
+    for frame in model.frames:
+        if frame.type == pin.FrameType.JOINT and frame.parentJoint == 1:
+            frame.name = ROOT_JOINT
+    model.names[1] = ROOT_JOINT
+    return model
 
 
 def _check_bodies(model: Any, path: Path) -> None:
@@ -194,6 +231,31 @@ def check_inertias(model: Any, coupling: Coupling, path: Path) -> None:
         RobotError: the robot has no mass, or the mass matrix is singular; the message names links
             and joints.
     """
+    weak = weak_joints(model, coupling, path)
+    if ROOT_JOINT in weak:
+        raise RobotError(
+            f"{path}: link {weak[ROOT_JOINT]} has almost no inertia and would float; give it an "
+            "<inertial>, or let the base be fixed (init --fixed)."
+        )
+    if weak:
+        names = ", ".join(f"{link} (joint {joint})" for joint, link in weak.items())
+        raise RobotError(
+            f"{path} gives almost no inertia to what moves at {names}; correct <inertial> there, "
+            "or leave the joint out of robot.actuated."
+        )
+
+
+def weak_joints(model: Any, coupling: Coupling, path: Path) -> dict[str, str]:
+    """Return the joints that move almost no inertia, alone or together, with their links.
+
+    Args:
+        model: the model of all joints that move.
+        coupling: how they move with the robot's coordinates.
+        path: what messages call it.
+
+    Raises:
+        RobotError: the robot has no mass.
+    """
     if not sum(body.mass for body in model.inertias[1:]) > 0.0:
         raise RobotError(f"{path} gives the robot no positive, finite mass; add <inertial> tags.")
     q = coupling.expand(coupling.restrict(pin.neutral(model)))
@@ -202,50 +264,42 @@ def check_inertias(model: Any, coupling: Coupling, path: Path) -> None:
     size = np.sqrt(np.maximum(own, np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(M / np.outer(size, size))
     weak = (own < LEAST_INERTIA) | ((values[0] < _SINGULAR) & (np.abs(vectors[:, 0]) > 0.3))
-    if weak.any():
-        links = _links(model)
-        velocities = coupling.restrict(np.arange(model.nv))[weak]
-        moved = [
-            k
-            for k, j in enumerate(model.joints)
-            if k and ((velocities >= j.idx_v) & (velocities < j.idx_v + j.nv)).any()
-        ]
-        names = ", ".join(f"{links.get(k, '?')} (joint {model.names[k]})" for k in moved)
-        raise RobotError(
-            f"{path} gives almost no inertia to what moves at {names}; correct <inertial> there, "
-            "or leave the joint out of robot.actuated."
-        )
+    links, velocities = _links(model), coupling.restrict(np.arange(model.nv))[weak]
+    return {
+        str(model.names[k]): links.get(k, "?")
+        for k, joint in enumerate(model.joints)
+        if k and ((velocities >= joint.idx_v) & (velocities < joint.idx_v + joint.nv)).any()
+    }
 
 
 def reduce_model(
-    model: Any, path: Path, *, actuated: Sequence[str] | None, followers: Mapping[str, Follower]
+    said: Description, path: Path, *, actuated: Sequence[str] | None
 ) -> tuple[Any, dict[str, Follower]]:
     """Lock every joint that neither is actuated nor follows one that is.
 
     Followers are locked where their leader's neutral position puts them.
 
     Args:
-        model: the whole model.
+        said: what the file says.
         path: what messages call it.
         actuated: names of the joints that have actuators; None for all that mimic no other one.
-        followers: the mimic joints of the model.
 
     Returns:
         The model of what moves, and the followers in it.
 
     Raises:
-        UnknownNameError: an actuated joint does not exist.
+        UnknownNameError: an actuated joint does not exist, or mimics one that does not.
         RobotError: no joint is left, or one mimics another or has more than one degree of freedom.
     """
-    movable = [name for name in model.names[1:] if name != ROOT_JOINT]
-    names = _actuated(movable, path, actuated=actuated, followers=followers)
+    model, followers = said.model, said.followers
+    names = _actuated(said, path, actuated=actuated)
     driven = {
         name: follower
         for name, follower in followers.items()
         if follower.leader in names and follower.multiplier != 0.0
     }
     locked, at = [], pin.neutral(model)
-    for name in movable:
+    for name in said.movable:
         number = model.getJointId(name)
         if name in followers:
             at[model.joints[number].idx_q] = followers[name].offset
@@ -253,26 +307,37 @@ def reduce_model(
             locked.append(number)
     reduced = _lock(model, locked, at) if locked else model
     for name in names:
-        if reduced.joints[reduced.getJointId(name)].nv != 1:
-            raise RobotError(
-                f"{path}: joint {name} has more than one degree of freedom; "
-                "actuated joints must be revolute, continuous or prismatic."
-            )
+        problem = not_actuated(reduced.joints[reduced.getJointId(name)])
+        if problem:
+            raise RobotError(f"{path}: joint {name} {problem}.")
     return reduced, driven
 
 
-def _actuated(
-    movable: Sequence[str],
-    path: Path,
-    *,
-    actuated: Sequence[str] | None,
-    followers: Mapping[str, Follower],
-) -> list[str]:
+def not_actuated(joint: Any) -> str:
+    """Return why a joint of a model cannot have an actuator; empty if it can.
+
+    Args:
+        joint: Pinocchio's model of it.
+    """
+    must = "actuated joints must be revolute, continuous or prismatic"
+    if joint.nv != 1:
+        return f"has more than one degree of freedom; {must}"
+    if joint.shortname() not in _ACTUATED:
+        return f"is a {joint.shortname()} of Pinocchio; {must}, with a position of one number"
+    return ""
+
+
+def _actuated(said: Description, path: Path, *, actuated: Sequence[str] | None) -> list[str]:
     """Names of the joints that have actuators, checked."""
+    movable, followers = said.movable, said.followers
+    if not movable:
+        raise RobotError(f"{path}: no joint moves, so there is nothing to actuate.")
     names = [j for j in movable if j not in followers] if actuated is None else list(actuated)
     for name in names:
         if name not in movable:
             raise near(name, movable, what=f"joint of {path.name}")
+        if name in said.astray:
+            raise said.astray[name]
         if name in followers:
             raise _follows(name, followers[name], path)
     if len(set(names)) < len(names):

@@ -4,12 +4,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from sealag.errors import RobotError, near
+from sealag.errors import RobotError, SealagError, near
 from sealag.robot._urdf import ROOT_JOINT, number
 from sealag.typing import Array, IntArray
 
@@ -41,34 +41,48 @@ class Follower:
         return self.multiplier * leader + self.offset
 
 
-def read_followers(root: Element, path: Path) -> dict[str, Follower]:
-    """Return the movable joints of a URDF that mimic others, each with the joint that leads it.
+class Mimics(NamedTuple):
+    """The movable joints of a URDF that mimic others.
+
+    Attributes:
+        followers: each with the joint that leads it.
+        astray: those that mimic a joint that does not exist, with what is wrong.
+    """
+
+    followers: dict[str, Follower]
+    astray: dict[str, SealagError]
+
+
+def read_followers(root: Element, path: Path) -> Mimics:
+    """Return the movable joints of a URDF that mimic others.
 
     Args:
         root: the URDF's root element.
         path: what messages call it.
 
     Raises:
-        UnknownNameError: a joint mimics one that does not exist.
         RobotError: joints mimic each other in a circle, a multiplier or offset is not finite, or a
             joint has more than one degree of freedom.
     """
     kinds = {joint.get("name", ""): joint.get("type", "") for joint in root.iterfind("joint")}
-    direct = {
-        joint.get("name", ""): _mimic(joint, kinds, path)
-        for joint in root.iterfind("joint")
-        if joint.find("mimic") is not None and joint.get("type") != "fixed"
-    }
-    return {name: _resolved(name, direct, path) for name in direct}
+    direct: dict[str, Follower] = {}
+    astray: dict[str, SealagError] = {}
+    for joint in root.iterfind("joint"):
+        name, mimic = joint.get("name", ""), joint.find("mimic")
+        if mimic is None or joint.get("type") == "fixed":
+            continue
+        leader = mimic.get("joint", "")
+        if leader in kinds:
+            direct[name] = _mimic(name, mimic.attrib, kinds, path)
+        else:
+            what = f"joint (that joint {name} mimics) of {path.name}"
+            astray[name] = near(leader, kinds, what=what)
+    return Mimics({name: _resolved(name, direct, path) for name in direct}, astray)
 
 
-def _mimic(joint: Element, kinds: Mapping[str, str], path: Path) -> Follower:
+def _mimic(name: str, said: Mapping[str, str], kinds: Mapping[str, str], path: Path) -> Follower:
     """What the URDF says of one mimic joint."""
-    name, mimic = joint.get("name", ""), joint.find("mimic")
-    said = {} if mimic is None else mimic.attrib
     leader = said.get("joint", "")
-    if leader not in kinds:
-        raise near(leader, kinds, what=f"joint (that joint {name} mimics) of {path.name}")
     for one in (name, leader):
         if kinds[one] not in (*_SINGLE, "fixed"):
             raise RobotError(

@@ -1,6 +1,6 @@
 """Postures that a robot's maker names: the group states of an SRDF beside the URDF."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -15,11 +15,26 @@ class ReferencePosture(NamedTuple):
         name: what it is called there.
         file: the SRDF.
         joints: joint name to position, rad or m.
+        outside: what the file gives for joints that it puts outside their limits, rad or m.
     """
 
     name: str
     file: Path
     joints: dict[str, float]
+    outside: dict[str, float]
+
+    def within(self, lower: Mapping[str, float], upper: Mapping[str, float]) -> "ReferencePosture":
+        """Return the posture with joints that are outside their limits at the nearer one.
+
+        Args:
+            lower: limits by joint, rad or m.
+            upper: limits by joint, rad or m.
+        """
+        joints = {
+            name: min(max(value, lower[name]), upper[name]) for name, value in self.joints.items()
+        }
+        moved = {name: value for name, value in self.joints.items() if value != joints[name]}
+        return self._replace(joints=joints, outside=moved)
 
 
 def posture_beside(urdf: Path, joints: Collection[str]) -> ReferencePosture | None:
@@ -61,4 +76,4 @@ def _states(path: Path) -> Iterator[ReferencePosture]:
                 joints[joint.get("name", "")] = float(joint.get("value", ""))
             except ValueError:
                 continue
-        yield ReferencePosture(state.get("name", ""), path, joints)
+        yield ReferencePosture(state.get("name", ""), path, joints, {})

@@ -33,12 +33,16 @@ class Robot:
 
     Attributes:
         name: the URDF's robot name.
-        urdf_path: the file it was read from.
-        urdf_sha256: the file's SHA-256.
+        urdf_path: the file it was read from; None if it is of a Pinocchio model.
+        urdf_sha256: the file's SHA-256; of the expanded text where it is xacro or includes others,
+            of the model as Pinocchio writes it where it is no file.
         floating_base: whether the root link moves freely.
         joints: (n) names of the actuated joints, in the order of all arrays.
         followers: joints that move with one of `joints` and have no coordinate, by name. All terms
             (M, g, Jacobians, ...) are those of the coupled robot.
+        skipped: why a joint that moves cannot have an actuator, by its name; empty unless
+            `load_robot` was to skip such joints.
+        remarks: what is read otherwise than the file says it, a sentence each.
         position_lower: (n,) rad or m, -inf where there is none; the followers' limits count.
         position_upper: (n,) rad or m, inf where there is none; the followers' limits count.
         sliding: (n,) whether a joint is prismatic, with positions in m.
@@ -60,11 +64,13 @@ class Robot:
     """How far the length of a base quaternion may be from 1: what rounding to a few digits does."""
 
     name: str
-    urdf_path: Path
+    urdf_path: Path | None
     urdf_sha256: str
     floating_base: bool
     joints: tuple[str, ...]
     followers: Mapping[str, Follower]
+    skipped: Mapping[str, str]
+    remarks: tuple[str, ...]
     position_lower: Array
     position_upper: Array
     sliding: BoolArray
@@ -232,8 +238,15 @@ class Robot:
 
     def reference_posture(self) -> ReferencePosture | None:
         """Return the posture that an SRDF beside the URDF names, one to stand in before others;
-        None if there is none."""
-        return posture_beside(self.urdf_path, self.joints)
+        None if there is none. Joints that it puts outside their limits are at the nearer one."""
+        if self.urdf_path is None:
+            return None
+        found = posture_beside(self.urdf_path, self.joints)
+        lower, upper = (
+            dict(zip(self.joints, ends.tolist(), strict=True))
+            for ends in (self.position_lower, self.position_upper)
+        )
+        return None if found is None else found.within(lower, upper)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Return the joints' part (…, n) of configurations.

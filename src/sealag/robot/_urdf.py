@@ -3,7 +3,8 @@
 import math
 from collections import Counter
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
@@ -16,6 +17,8 @@ ROOT_JOINT = "root_joint"
 LEAST_INERTIA = 1e-9  # kg m², kg: of what an actuated joint moves
 _RESERVED = ("", ROOT_JOINT, "universe")
 _ENDS = ("lower", "upper")
+_LINK = ("inertial",)
+_JOINT = ("parent", "child", "origin", "axis", "limit", "dynamics", "mimic")
 _ENTRIES = ("ixx", "ixy", "ixz", "ixy", "iyy", "iyz", "ixz", "iyz", "izz")
 _INDEFINITE = 1e-6  # of a body's inertia: what rounding in a URDF does to a principal moment
 _PLACEHOLDER = 0.2  # of a body's inertia: sensors and covers fixed to public robots reach 0.15
@@ -35,10 +38,6 @@ def check_urdf(root: Element, path: Path) -> None:
             names it, its numbers and a remedy.
         UnknownNameError: a joint names a link that does not exist.
     """
-    if any("xacro" in element.tag for element in root.iter()):
-        raise RobotError(
-            f"{path} is a xacro file; expand it first: xacro {path.name} > robot.urdf."
-        )
     if root.tag != "robot" or root.find("link") is None:
         raise RobotError(f"{path} is not a URDF: it needs a <robot> with at least one <link>.")
     if root.find("joint") is None:
@@ -54,6 +53,50 @@ def check_urdf(root: Element, path: Path) -> None:
     _check_inertias(root, path)
 
 
+def swap_limits(root: Element) -> tuple[str, ...]:
+    """Exchange position limits whose lower one is the larger: they can only mean the same range.
+
+    Args:
+        root: the URDF's root element, which is changed.
+
+    Returns:
+        A sentence for each joint.
+    """
+    said = []
+    for joint in root.iterfind("joint"):
+        limit = joint.find("limit")
+        if limit is None:
+            continue
+        lower, upper = (limit.get(key, "0") for key in _ENDS)
+        if number(lower) > number(upper):
+            limit.set("lower", upper)
+            limit.set("upper", lower)
+            said.append(
+                f"The limits of joint {joint.get('name', '')} are {lower} … {upper} in the file "
+                f"and are read as {upper} … {lower}."
+            )
+    return tuple(said)
+
+
+def kinematics(root: Element, name: str) -> Element:
+    """Return a URDF with what a model of the dynamics needs and nothing else.
+
+    Visuals, collisions, materials, transmissions and what other tools write into the file may be of
+    any form.
+
+    Args:
+        root: the URDF's root element.
+        name: of the robot if the file gives none.
+    """
+    plain = Element("robot", name=root.get("name") or name)
+    for tag, kept in (("link", _LINK), ("joint", _JOINT)):
+        for element in root.iterfind(tag):
+            own = {key: element.attrib[key] for key in ("name", "type") if key in element.attrib}
+            copy = SubElement(plain, tag, own)
+            copy.extend(part for part in element if part.tag in kept)
+    return plain
+
+
 def number(text: str) -> float:
     """Return a number of the URDF; NaN if the text is none.
 
@@ -66,16 +109,29 @@ def number(text: str) -> float:
         return math.nan
 
 
-def joint_dynamics(joint: Element) -> tuple[float, float]:
-    """Return viscous damping and Coulomb friction of a joint, 0 where the URDF gives none.
+class JointDynamics(NamedTuple):
+    """What <dynamics> of a joint says, 0 where it says nothing.
+
+    Attributes:
+        damping: viscous, Nms/rad or Ns/m.
+        friction: Coulomb, Nm or N.
+        armature: reflected rotor inertia, kg m² or kg; MJCF has it, and some URDFs.
+    """
+
+    damping: float
+    friction: float
+    armature: float
+
+
+def joint_dynamics(joint: Element) -> JointDynamics:
+    """Return what <dynamics> of a joint says.
 
     Args:
         joint: the joint's element.
     """
     given = joint.find("dynamics")
-    if given is None:
-        return 0.0, 0.0
-    return number(given.get("damping", "0")), number(given.get("friction", "0"))
+    said = {} if given is None else given.attrib
+    return JointDynamics(*(number(said.get(key, "0")) for key in JointDynamics._fields))
 
 
 def _check_names(root: Element, path: Path) -> None:
@@ -133,17 +189,11 @@ def _check_tree(root: Element, path: Path) -> None:
 
 
 def _check_joint(joint: Element, path: Path) -> None:
-    name, limit, axis = joint.get("name", ""), joint.find("limit"), joint.find("axis")
-    lower, upper = (limit.get(key, "0") if limit is not None else "0" for key in _ENDS)
-    if number(lower) > number(upper):
-        raise RobotError(
-            f"{path}: the limits of joint {name} are {lower} … {upper}; the lower one must "
-            "come first."
-        )
+    name, axis = joint.get("name", ""), joint.find("axis")
     ways = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
     if joint.get("type") != "fixed" and not any(map(number, ways.split())):
         raise RobotError(f"{path}: the axis of joint {name} is zero; it needs a direction.")
-    for what, value in zip(("damping", "friction"), joint_dynamics(joint), strict=True):
+    for what, value in joint_dynamics(joint)._asdict().items():
         if not 0.0 <= value <= _MOST_DAMPING:
             raise RobotError(
                 f"{path}: the {what} of joint {name} is {value:g}; <dynamics> needs a number in "
