@@ -378,7 +378,7 @@ MUTANTS = [
     ),
     *_of(
         "passivity", "passivity/_axis.py",
-        ("turn[rows] = angle + 2.0 * math.pi * np.round((shifted.imag - angle) / 2.0 / math.pi)",
+        ("turn[rows] = angle + math.tau * np.round((shifted.imag - angle) / math.tau)",
          "turn[rows] = angle", "equal joints that turn by 2π together"),
     ),
     *_of(

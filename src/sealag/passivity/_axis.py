@@ -5,7 +5,9 @@ circle of ψ has to be searched.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -17,6 +19,7 @@ EARLIER = 1e-6
 into pieces that rounding keeps open; ten times more passes a crossing 1e-5 too late."""
 
 _TURN = 0.5
+_FAR = 0.1
 _MOST_FREQUENCIES = 60_000
 _MOST_ENTRIES = 12_000_000
 """Of all matrices over pieces of the circle: 4,000 pieces for 56 states, 80,000 for 12. A lightly
@@ -151,74 +154,179 @@ def _shortest(A_0: Array, A_1: Array, low: Array, high: Array) -> Array:
     return np.minimum(up, down).min(axis=1, initial=np.inf)
 
 
-def unstable_roots(loop: DelayedLoop, delay: float, *, omega: float | None) -> int | None:
-    """Count roots in the right half plane by the turns of the characteristic function.
+def unstable_roots(loop: DelayedLoop, delays: Sequence[float]) -> list[int | None]:
+    """Count roots in the right half plane at some delays by the turns of the return difference.
 
-    det(jω − A(jω)) / det(jω − A_0 − A_1 − A_e) → 1, and it turns by −π over [0, ∞) for each root
-    that the delays add there.
+    With A = A_0 + A_1 + A_e, A_1 = L_1 R_1 and A_e = L_e R_e, the characteristic function is
+
+        det(jω − A(jω)) = det(jω − A) det T(jω) ,   T = I + D(jω) R (jω − A)⁻¹ L ,
+
+    D = diag(1 − e^{-jωd}, 1 − e^{-jωe}). T is I at 0 and far above all roots, and its determinant
+    turns by −π over [0, ∞) for each root that the delays add to those of A.
 
     Args:
         loop: the loop.
-        delay: d, s.
-        omega: a frequency around which the grid is finer, rad/s.
+        delays: d each, s.
 
     Returns:
-        The count; None if it could not be resolved.
+        The counts; None where one could not be resolved.
     """
-    roots = np.linalg.eigvals(balanced(loop.sum)[0])
-    grid = _grid(roots, omega)
-    far = np.abs(_ratio(loop, grid, delay) - 1.0)
-    turn, moved = _steps(loop, grid[:-1], grid[1:], delay)
-    slowest = max(delay, loop.embedded if loop.A_e is not None else 0.0)
-    while len(grid) < _MOST_FREQUENCIES:
-        gaps = np.diff(grid)
-        late = (gaps * slowest > _TURN) & (np.maximum(far[1:], far[:-1]) > 0.1)
-        split = np.flatnonzero(~(moved <= _TURN) | late)
-        split = split[gaps[split] > 1e-13 * grid[split]]
-        if not len(split):
-            without = np.angle((1j * grid[-1] - roots) / (1j * grid[0] - roots)).sum()
-            turns = float(without - turn.sum()) / math.pi
-            settled = far[-1] < 0.1 and abs(turns - round(turns)) < 0.1
-            return int((roots.real > 0.0).sum()) + round(turns) if settled else None
-        fresh = (grid[split] + grid[split + 1]) / 2.0
-        turn[split], moved[split], later = *_steps(loop, grid[split], fresh, delay), split + 1
-        after = _steps(loop, fresh, grid[later], delay)
-        turn, moved = (np.insert(old, later, new) for old, new in zip((turn, moved), after))
-        far = np.insert(far, later, np.abs(_ratio(loop, fresh, delay) - 1.0))
-        grid = np.insert(grid, later, fresh)
-    return None
+    opened = _Opened.of(loop)
+    return [opened.unstable_roots(delay) for delay in delays]
 
 
-def _steps(loop: DelayedLoop, low: Array, high: Array, delay: float) -> tuple[Array, Array]:
-    """How far det P, P = jω − A(jω), turns from one frequency to another, and how far P moves.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Opened:
+    """A loop opened where it is late, in Schur's basis of A = A_0 + A_1 + A_e.
 
-    P₂ = P₁ (I + E). The determinant turns by the sum of the angles of the eigenvalues of I + E. It
-    tells that sum but for turns by 2π, which k equal joints make where each turns by 2π/k; the
-    traces of E, E², E³ and E⁴ tell which, if no eigenvalue of E is larger than ½: ‖E¹⁶‖ bounds
-    them.
-
-    Returns:
-        (N,) rad, and (N,) a bound of the eigenvalues of E; NaN where P₁ is singular.
+    Attributes:
+        triangle: (n, n) Schur form of A.
+        left: (n, r) L.
+        right: (r, n) R.
+        late: how many of the r signals are late by d; the others are late by e.
+        embedded: e, s.
     """
-    turn, moved = np.full((2, len(low)), np.nan)
-    identity = np.eye(len(loop.A_0))
-    for first in range(0, len(low), _CHUNK):
-        rows = slice(first, first + _CHUNK)
-        start, end = (
-            1j * w[:, None, None] * identity - loop.at(w, delay) for w in (low[rows], high[rows])
+
+    triangle: Array
+    left: Array
+    right: Array
+    late: int
+    embedded: float
+
+    @classmethod
+    def of(cls, loop: DelayedLoop) -> Self:
+        from scipy.linalg import schur
+
+        none = np.zeros_like(loop.A_0)
+        A_0, A_1, A_e = balanced(loop.A_0, loop.A_1, none if loop.A_e is None else loop.A_e)
+        (L, R), (L_e, R_e) = _halves(A_1), _halves(A_e)
+        triangle, Q = schur(A_0 + A_1 + A_e, output="complex")  # pyright: ignore
+        return cls(
+            triangle=triangle,
+            left=Q.conj().T @ np.hstack([L, L_e]),
+            right=np.vstack([R, R_e]) @ Q,
+            late=L.shape[1],
+            embedded=loop.embedded if L_e.size else 0.0,
         )
+
+    @property
+    def poles(self) -> Array:
+        """Roots of the loop without delays, (n,)."""
+        return np.diagonal(self.triangle)
+
+    def unstable_roots(self, delay: float) -> int | None:
+        """Roots right of the axis at a delay; None if they cannot be told."""
+        grid = self._grid()
+        low, high = grid[:-1], grid[1:]
+        slowest, turn, count = max(delay, self.embedded), 0.0, 0
+        while len(low):
+            count += len(low)
+            if count > _MOST_FREQUENCIES:
+                return None
+            steps = self._steps(low, high, delay)
+            late = ((high - low) * slowest > _TURN) & (steps.far > _FAR)
+            open_ = (~(steps.moved <= _TURN) | late) & (high - low > self._finest(high))
+            turn += float(steps.turn[~open_].sum())
+            low, high = low[open_], high[open_]
+            middle = (low + high) / 2.0
+            low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
+        turns = turn / math.pi
         with np.errstate(all="ignore"):
-            E = _solved(start, end - start)
-            powers = [E, E @ E]
-            powers += [powers[1] @ E, powers[1] @ powers[1]]
-            shifted = np.einsum("kii->k", powers[0]) - np.einsum("kii->k", powers[1]) / 2.0
-            shifted += np.einsum("kii->k", powers[2]) / 3.0
-            shifted -= np.einsum("kii->k", powers[3]) / 4.0
-            angle = np.angle(np.linalg.slogdet(identity + E)[0])
-            turn[rows] = angle + 2.0 * math.pi * np.round((shifted.imag - angle) / 2.0 / math.pi)
-            last = powers[3] @ powers[3]
-            moved[rows] = np.linalg.norm(last @ last, axis=(1, 2)) ** (1.0 / 16.0)
-    return turn, moved
+            last = abs(np.linalg.det(self._difference(grid[-1:], delay)[0]) - 1.0)
+        if not (last < _FAR and abs(math.remainder(turns, 1.0)) < 0.1):
+            return None
+        return int((self.poles.real > 0.0).sum()) - round(turns)
+
+    def _finest(self, omega: Array) -> Array:
+        """Widths (N,) below which an interval up to a frequency (N,) is not split."""
+        sizes = np.abs(self.poles)
+        return 1e-13 * np.maximum(omega, sizes[sizes > 0.0].min())
+
+    def _grid(self) -> Array:
+        """Frequencies to begin with: from 0 to far above all poles, and between two of them no
+        pole's part of T changes by more than half."""
+        sizes = np.abs(self.poles)
+        spread = np.geomspace(1e-4 * sizes[sizes > 0.0].min(), 30.0 * sizes.max(), 60)
+        grid = np.concatenate([[0.0], spread])
+        while True:
+            middle, gap = (grid[1:] + grid[:-1]) / 2.0, np.diff(grid)
+            near = np.abs(1j * middle[:, None] - self.poles).min(axis=1)
+            split = (gap > 0.5 * near) & (gap > self._finest(grid[1:]))
+            if not split.any():
+                return grid
+            grid = np.sort(np.concatenate([grid, middle[split]]))
+
+    def _difference(self, omega: Array, delay: float) -> Array:
+        """Return differences T, (N, r, r), at (N,) frequencies, by back substitution."""
+        (n, r), count = self.left.shape, len(omega)
+        flat = np.empty((n, count * r), dtype=complex)
+        rows = flat.reshape(n, count, r)
+        for i in range(n - 1, -1, -1):
+            rows[i] = self.left[i] + (self.triangle[i, i + 1 :] @ flat[i + 1 :]).reshape(count, r)
+            rows[i] /= (1j * omega - self.triangle[i, i])[:, None]
+        response = (self.right @ flat).reshape(r, count, r).swapaxes(0, 1)
+        own = np.arange(r) < self.late
+        turned = -np.expm1(-1j * omega[:, None] * np.where(own, delay, self.embedded))
+        return np.eye(r) + turned[:, :, None] * response
+
+    def _steps(self, low: Array, high: Array, delay: float) -> "_Steps":
+        """How far det T turns from one frequency to another, and how far T moves.
+
+        T₂ = T₁ (I + E). The determinant turns by the sum of the angles of the eigenvalues of I + E.
+        It tells that sum but for turns by 2π, which k equal joints make where each turns by 2π/k;
+        the traces of E, E², E³ and E⁴ tell which, if no eigenvalue of E is larger than ½: ‖E‖, or
+        ‖E¹⁶‖ where that is too large, bounds them.
+        """
+        turn, moved, far = np.full((3, len(low)), np.nan)
+        for first in range(0, len(low), _CHUNK):
+            rows = slice(first, first + _CHUNK)
+            ends = np.concatenate([low[rows], high[rows]])
+            omega, at = np.unique(ends, return_inverse=True)
+            start, end = at[: len(at) // 2], at[len(at) // 2 :]
+            with np.errstate(all="ignore"):
+                T = self._difference(omega, delay)
+                sign, size = np.linalg.slogdet(T)
+                away = np.abs(sign * np.exp(size) - 1.0)
+                E = _solved(T[start], T[end] - T[start])
+                square = E @ E
+                shifted = np.einsum("kii->k", E) - _trace(E, E) / 2.0
+                shifted += _trace(E, square) / 3.0 - _trace(square, square) / 4.0
+                angle = np.angle(sign[end] / sign[start])
+                turn[rows] = angle + math.tau * np.round((shifted.imag - angle) / math.tau)
+                bound = np.linalg.norm(E, axis=(1, 2))
+                long = ~(bound <= _TURN)
+                bound[long] = _radius_bound(square[long])
+                moved[rows], far[rows] = bound, np.maximum(away[start], away[end])
+        return _Steps(turn, moved, far)
+
+
+class _Steps(NamedTuple):
+    """(N,) each: rad that det T turns; a bound of the eigenvalues of E, NaN where T₁ is singular;
+    the larger distance of det T from 1 at the two ends."""
+
+    turn: Array
+    moved: Array
+    far: Array
+
+
+def _halves(matrix: Array) -> tuple[Array, Array]:
+    """L (n, r) and R (r, n) with L R the matrix, up to its rounding."""
+    U, values, V = np.linalg.svd(matrix)
+    rank = int((values > EPS * values.max(initial=0.0)).sum())
+    root = np.sqrt(values[:rank])
+    return U[:, :rank] * root, root[:, None] * V[:rank]
+
+
+def _trace(A: Array, B: Array) -> Array:
+    """Traces of A B, (N,)."""
+    return np.einsum("kij,kji->k", A, B)
+
+
+def _radius_bound(square: Array) -> Array:
+    """‖E¹⁶‖^{1/16} of E², (N, r, r)."""
+    for _ in range(3):
+        square = square @ square
+    return np.linalg.norm(square, axis=(1, 2)) ** (1.0 / 16.0)
 
 
 def _solved(P: Array, Q: Array) -> Array:
@@ -229,27 +337,3 @@ def _solved(P: Array, Q: Array) -> Array:
         singular = np.linalg.slogdet(P)[0] == 0.0
         P = np.where(singular[:, None, None], np.eye(P.shape[-1]), P)
         return np.where(singular[:, None, None], np.nan, np.linalg.solve(P, Q))
-
-
-def _grid(roots: Array, omega: float | None) -> Array:
-    """Frequencies to begin with: all decades, and close to roots and the crossing."""
-    sizes = np.abs(roots)
-    low = 1e-4 * min(float(sizes.min()), omega or math.inf)
-    high = 30.0 * float(sizes.max())
-    spread = np.concatenate([-np.geomspace(1e-3, 3.0, 6)[::-1], [0.0], np.geomspace(1e-3, 3.0, 6)])
-    near = np.abs(roots.imag)[:, None] + spread * np.abs(roots.real)[:, None]
-    close = omega * (1.0 + 1e-2 * spread) if omega else np.zeros(0)
-    grid = np.concatenate([np.geomspace(low, high, 300), near.ravel(), close])
-    return np.unique(grid[(grid >= low) & (grid <= high)])
-
-
-def _ratio(loop: DelayedLoop, omega: Array, delay: float) -> Array:
-    """The characteristic function over that without delays, (N,)."""
-    out = np.empty(len(omega), dtype=complex)
-    for first in range(0, len(omega), _CHUNK):
-        w = omega[first : first + _CHUNK]
-        whole = 1j * w[:, None, None] * np.eye(len(loop.A_0))
-        sign, size = np.linalg.slogdet(whole - loop.at(w, delay))
-        sign_0, size_0 = np.linalg.slogdet(whole - loop.sum)
-        out[first : first + _CHUNK] = sign / sign_0 * np.exp(size - size_0)
-    return out

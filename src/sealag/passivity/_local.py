@@ -134,7 +134,7 @@ class LocalLoop:
         if answer.unstable_modes == 0 and reduced.A_e is None:
             yield _swept(reduced, crossing)
         else:
-            yield _counted(reduced, crossing, omega=omega, before=answer.unstable_modes)
+            yield _counted(reduced, crossing, before=answer.unstable_modes)
 
     def _structure_checks(self, question: Question, proof: InstantProof | None) -> Iterator[Check]:
         """Names of states, rates of positions, and the motors' rows as the design has them."""
@@ -290,7 +290,7 @@ def _size(A: Array) -> float:
 def _unstable(claimed: int, loop: DelayedLoop) -> Check:
     name = "unstable modes without delay"
     if loop.A_e is not None:
-        found = unstable_roots(loop, 0.0, omega=None)
+        (found,) = unstable_roots(loop, [0.0])
         words = f"{claimed} claimed, {found} counted, argument principle in floating point"
         return Check(name=name, ok=found == claimed, detail=words)
     roots, error = roots_with_error(loop.sum)
@@ -322,7 +322,7 @@ def _swept(loop: DelayedLoop, crossing: float) -> Check:
         words = f"{found:.9g} s is not excluded"
         if found >= _LAST * limit:
             at = _SHARES[-1] * crossing
-            number = unstable_roots(loop, at, omega=None)
+            (number,) = unstable_roots(loop, [at])
             ok = number == 0
             counted = "?" if number is None else number
             words += f", with {counted} roots right of the axis at {at:.9g} s,"
@@ -333,12 +333,12 @@ def _swept(loop: DelayedLoop, crossing: float) -> Check:
     )
 
 
-def _counted(loop: DelayedLoop, crossing: float, *, omega: float | None, before: int) -> Check:
+def _counted(loop: DelayedLoop, crossing: float, *, before: int) -> Check:
     """Roots right of the axis at delays below the first crossing, or at some where there is none:
     a loop that is unstable without delay may lose some, and gains none."""
     scale = crossing if crossing < math.inf else _UNRESOLVED / _size(loop.sum)
     delays = [share * scale for share in _SHARES]
-    found = [unstable_roots(loop, delay, omega=omega) for delay in delays]
+    found = unstable_roots(loop, delays)
     at = ", ".join(f"{delay:.6g}" for delay in delays)
     words = ", ".join("?" if number is None else f"{number}" for number in found)
     return Check(
