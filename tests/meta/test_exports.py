@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from helpers.source import ROOT, exported, imported, modules, tree
 
 MOST = 89
-"""Names of all rooms together: fewer than 90."""
+"""Names of all rooms together, at most."""
 NO_ROOMS = {"sealag.cli", "sealag.data", "sealag.kernels"}
 """The command line is called by its entry point; data and kernels export nothing."""
 
@@ -84,7 +84,7 @@ def test_an_unused_name_is_noticed():
 
 def test_rooms_export_few_names():
     counts = {room: len(names) for room, names in _rooms().items()}
-    assert sum(counts.values()) < MOST, counts
+    assert sum(counts.values()) <= MOST, counts
 
 
 def test_uses_in_code_are_found():

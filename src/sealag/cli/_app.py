@@ -180,6 +180,56 @@ def margin(
 
 
 @app.command()
+def tune(
+    project: Project,
+    motion: MotionFile = None,
+    aim: Annotated[
+        str,
+        typer.Option(
+            "--aim",
+            help="stiffness: the largest; bandwidth: the largest of joint PD, or bandwidth=30 "
+            "(rad/s); damping: the least of the motors; drag: the least along the motion.",
+        ),
+    ] = "stiffness",
+    number: Annotated[
+        str, typer.Option("--number", help="Delay that counts: passive, jitter or constant.")
+    ] = "passive",
+    share: Annotated[
+        str, typer.Option("--share", help="One factor in common, or each task's or direction's.")
+    ] = "common",
+    delay_ms: Annotated[
+        float | None, typer.Option("--delay-ms", help="Delay. Default: the design's own.")
+    ] = None,
+    safety: Annotated[float, typer.Option("--safety", help="Factor on the delay.")] = 1.0,
+    damping_ratio: Annotated[
+        float, typer.Option("--damping-ratio", help="Of joint PD, for its bandwidth.")
+    ] = 1.0,
+    write: Annotated[
+        Path | None,
+        typer.Option("--write", help="Project file that gets the gains: PROJECT, or one beside."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Find gains for a delay and what stops them; status 1 if none are certified."""
+    from sealag.cli._tune import tune_project
+
+    raise typer.Exit(
+        tune_project(
+            project,
+            motion,
+            aim=aim,
+            number=number,
+            share=share,
+            delay_ms=delay_ms,
+            safety=safety,
+            damping_ratio=damping_ratio,
+            write=write,
+            as_json=as_json,
+        )
+    )
+
+
+@app.command()
 def verify(
     certificate: Annotated[Path, typer.Argument(help="Certificate file.")],
     exact: Annotated[bool, typer.Option("--exact", help="Check in rational arithmetic.")] = False,

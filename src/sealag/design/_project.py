@@ -58,11 +58,12 @@ _TOO_LARGE = "has too many digits; TOML's whole numbers have at most 19"
 _REQUIRED = ("spring_stiffness", "rotor_inertia", "motor_damping", "inertia_shaping")
 
 
-def load(path: str | Path) -> System:
+def load(path: str | Path, *, text: str | None = None) -> System:
     """Read a project file.
 
     Args:
         path: TOML file, or `bundled:hume`; relative paths in it start at its folder.
+        text: what the file is to say, before it does so; its own text if None.
 
     Returns:
         The system.
@@ -74,6 +75,7 @@ def load(path: str | Path) -> System:
     """
     path = _resolved(path)
     content = read_whole(path, what="The project file", largest=LARGEST_PROJECT_BYTES)
+    content = content if text is None else text.encode()
     with _named(path, ""):
         project = _parsed(content, path)
         return _system(project, path, content.decode("utf-8-sig"))

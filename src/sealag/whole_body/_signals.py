@@ -34,6 +34,23 @@ class Refusal(NamedTuple):
     reason: str
 
 
+class SeriesLimit(NamedTuple):
+    """F_q ≼ (C_s + C_d)⁻¹: a spring in series with the stiffness that a delay leaves.
+
+    Attributes:
+        spring: (n,) compliance C_s of the springs, rad/Nm.
+        delay: (n,) compliance C_d = d / D_θ of the delay, rad/Nm.
+    """
+
+    spring: Array
+    delay: Array
+
+    @property
+    def stiffness(self) -> Array:
+        """(C_s + C_d)⁻¹, (n,) Nm/rad."""
+        return 1.0 / (self.spring + self.delay)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Signal(ABC):
     """The joint angles at which a law evaluates x, J*, S and ḡ; a new signal is a subclass.
@@ -81,6 +98,15 @@ class Signal(ABC):
             K: (n,) spring stiffness, Nm/rad.
         """
         return F_q
+
+    def limits(self, K: Array, delay: Array) -> tuple[SeriesLimit, ...]:
+        """Return what F_q ≽ 0 must lie below for F_θ ≼ D_θ / d and a signal that exists.
+
+        Args:
+            K: (n,) spring stiffness, Nm/rad.
+            delay: (n,) d / D_θ, rad/Nm.
+        """
+        return (SeriesLimit(np.zeros_like(K), delay),)
 
     def refusal(self, contraction: Array) -> Refusal | None:
         """Return why no passive bound covers the signal; None if one does.
@@ -166,6 +192,15 @@ class StaticJoint(Signal):
         F_theta[regular] = np.linalg.solve(loop[regular], np.swapaxes(F_q, -1, -2)[regular])
         return np.swapaxes(F_theta, -1, -2)
 
+    def limits(self, K: Array, delay: Array) -> tuple[SeriesLimit, ...]:
+        """Return (K⁻¹ + d D_θ⁻¹)⁻¹: F_θ = (F_q⁻¹ − K⁻¹)⁻¹ grows with F_q.
+
+        Args:
+            K: (n,) spring stiffness, Nm/rad.
+            delay: (n,) d / D_θ, rad/Nm.
+        """
+        return (SeriesLimit(1.0 / K, delay),)
+
     def refusal(self, contraction: Array) -> Refusal | None:
         bad = ~(contraction < 1.0)
         if not bad.any():
@@ -212,6 +247,16 @@ class Tank(Signal):
                 raise InputError(f"The tank's {name} is {value}; 0 or a positive number is right.")
         if self.iterations < 1:
             raise InputError(f"iterations is {self.iterations}; 1 is the fewest.")
+
+    def limits(self, K: Array, delay: Array) -> tuple[SeriesLimit, ...]:
+        """Return D_θ / d, and K below which q̄(θ) exists.
+
+        Args:
+            K: (n,) spring stiffness, Nm/rad.
+            delay: (n,) d / D_θ, rad/Nm.
+        """
+        nothing = np.zeros_like(K)
+        return SeriesLimit(nothing, delay), SeriesLimit(1.0 / K, nothing)
 
     def refusal(self, contraction: Array) -> Refusal | None:
         if self.flow is TankFlow.PUBLISHED:

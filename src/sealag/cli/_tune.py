@@ -1,0 +1,135 @@
+"""`sealag tune`: gains for a delay, what stops them, and the project file that has them."""
+
+from pathlib import Path
+from typing import Any
+
+from sealag import design
+from sealag.cli._commands import busy, compile_kernels, motion_of
+from sealag.cli._json import show_json
+from sealag.cli._terminal import show
+from sealag.design import System
+from sealag.errors import FileError, InputError
+from sealag.files import bundled, check_output, is_inside, write_text
+from sealag.tune import tune
+from sealag.units import number_of, seconds_from_ms, time_text
+
+_SHARES_SHOWN = 3
+
+
+def tune_project(
+    project: str,
+    motion: Path | None,
+    *,
+    aim: str,
+    delay_ms: float | None,
+    write: Path | None,
+    as_json: bool,
+    **asked: Any,
+) -> int:
+    """Find gains, write them if that is asked for, and show them.
+
+    Returns:
+        0 if gains were found and certified, else 1.
+    """
+    word, bandwidth = _aim(aim)
+    system = design.load(project)
+    delay = None if delay_ms is None else seconds_from_ms(delay_ms)
+    if write is not None:
+        _check_target(write, system, motion, delay)
+    along = motion_of(system, motion)
+    compile_kernels()
+    with busy("tuning", along):
+        tuned = tune(system, along, aim=word, bandwidth=bandwidth, delay=delay, **asked)
+    written = write if tuned.found else None
+    if written is not None:
+        write_text(written, tuned.system.text)
+    if as_json:
+        show_json({**tuned.summary(), "written": None if written is None else str(written)})
+    else:
+        _show(tuned, written)
+    return 0 if tuned.found else 1
+
+
+def _aim(aim: str) -> tuple[str, float | None]:
+    """The aim, and the bandwidth that --aim bandwidth=NUMBER gives."""
+    word, given, text = aim.partition("=")
+    if not given:
+        return word, None
+    value = number_of(text)
+    if word != "bandwidth" or value is None:
+        raise InputError(
+            f"--aim is {aim!r}; it must be stiffness, bandwidth, bandwidth=NUMBER (rad/s), damping "
+            "or drag."
+        )
+    return word, value
+
+
+def _check_target(path: Path, system: System, motion: Path | None, delay: float | None) -> None:
+    """Refuse to write where the gains would not be what was certified, or over another input."""
+    own = system.files[0]
+    others = [*system.files[1:], *([motion] if motion else [])]
+    if path.resolve() == own.resolve():
+        if is_inside(own.resolve(), bundled("hume", ending=".toml", what="project").parent):
+            raise FileError(f"{own} came with sealag and is not changed; copy it first.")
+    else:
+        check_output(path, *system.files, *others)
+        if path.resolve().parent != own.resolve().parent:
+            raise FileError(
+                f"{path} lies in another folder than {own}, where the project's relative paths "
+                "start; choose a --write beside it."
+            )
+    if delay is not None and delay < system.delays.d_1:
+        raise InputError(
+            f"Gains for {time_text(delay)} are not written: the project's own delay of "
+            f"{time_text(system.delays.d_1)} is longer; change [delays] first."
+        )
+
+
+def _show(tuned: Any, path: Path | None) -> None:
+    """Show gains, what stops them and by how much."""
+    question, binding = tuned.question, tuned.binding
+    rows = [
+        ("tuned", f"{question.aim} for the {question.number} number"),
+        ("required", f"{time_text(question.required)} of {time_text(question.system.delays.d_1)}"),
+        ("reached", time_text(tuned.reached_s)),
+    ]
+    if tuned.scale is not None:
+        rows.append(("factor of all stiffness", f"{tuned.scale:.6g}"))
+    if tuned.bandwidth_rad_s is not None:
+        rows.append(("bandwidth", f"{tuned.bandwidth_rad_s:.6g} rad/s"))
+    if len(tuned.factors) > 1:
+        rows += [(f"  factor of {name}", f"{value:.6g}") for name, value in tuned.factors.items()]
+    if binding is not None:
+        rows += [(name, _gain(value)) for name, value in tuned.gains().items()]
+    if tuned.certificate is not None:
+        rows.append(("certificate", tuned.certificate.answer.status.value.replace("_", " ")))
+    if binding is not None:
+        shares = sorted(binding.joints.items(), key=lambda item: -item[1])[:_SHARES_SHOWN]
+        joints = ", ".join(f"{name} {share:.0%}" for name, share in shares if share >= 0.01)
+        parts = ""
+        if binding.spring_share:
+            parts = (
+                f" (spring {binding.spring_share:.0%}, delay {1.0 - binding.spring_share:.0%} of "
+                "the compliance)"
+            )
+        rows.append(("stopped by", f"{binding.kind}{parts} at {joints}"))
+        rows.append(("worst instant", f"{binding.instant}, at {binding.time_s:.3f} s"))
+    if path is not None:
+        rows.append(("written", str(path)))
+    for name, value in rows:
+        show(f"{name:26} {value}")
+    for reason in tuned.reasons:
+        show(f"not tuned because {reason}")
+
+
+def _gain(values: dict[str, Any]) -> str:
+    """Gains in one line: one number if all are alike."""
+    if len({str(value) for value in values.values()}) == 1:
+        return _text(next(iter(values.values())))
+    return ", ".join(f"{name} {_text(value)}" for name, value in values.items())
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(_text(entry) for entry in value)}]"
+    return f"{value:.6g}"

@@ -1,0 +1,106 @@
+"""What is asked: which gain, for which number, how the knob is shared."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from sealag.design import System
+from sealag.errors import InputError
+from sealag.robot import Motion
+
+LARGEST_SAFETY = 1e3
+MOST_INSTANTS = 20_000
+"""Instants whose matrices are held at once: 30 joints with 12 directions take 2 GB."""
+
+
+class Aim(StrEnum):
+    """What is made as large or as small as the delay allows."""
+
+    STIFFNESS = "stiffness"
+    BANDWIDTH = "bandwidth"
+    DAMPING = "damping"
+    DRAG = "drag"
+
+
+class Number(StrEnum):
+    """Which of the three delays must reach the required one."""
+
+    PASSIVE = "passive"
+    JITTER = "jitter"
+    CONSTANT = "constant"
+
+
+class Share(StrEnum):
+    """What has a factor of its own: all tasks together, each task, each direction or joint."""
+
+    COMMON = "common"
+    TASK = "task"
+    DIRECTION = "direction"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Question:
+    """What `tune` is asked.
+
+    Attributes:
+        system: the design, with the delay that is asked about.
+        motion: its instants; None for the posture.
+        aim: which gain.
+        number: which delay counts.
+        share: what has a factor of its own.
+        required: the delay that the number must reach, s: safety times that of the design.
+        bandwidth: of joint PD, rad/s; None for the largest.
+        damping_ratio: of joint PD.
+    """
+
+    system: System
+    motion: Motion | None
+    aim: Aim
+    number: Number
+    share: Share
+    required: float
+    bandwidth: float | None
+    damping_ratio: float
+
+    def __post_init__(self) -> None:
+        """Refuse what has no answer.
+
+        Raises:
+            InputError: the parts do not fit together, or the motion is too long.
+        """
+        self.system.require_law("Tuned gains are")
+        if self.motion is not None and len(self.motion) > MOST_INSTANTS:
+            raise InputError(
+                f"The motion has {len(self.motion)} instants; tune takes {MOST_INSTANTS} at most. "
+                "Tune for fewer of its rows, and certify the motion with the gains."
+            )
+        if self.share is not Share.COMMON and (
+            self.aim is not Aim.STIFFNESS or self.number is not Number.PASSIVE
+        ):
+            raise InputError(
+                f"A factor for each {self.share} is found for the largest stiffness by the passive "
+                "number only; let the share be common."
+            )
+        if self.aim is not Aim.BANDWIDTH and self.bandwidth is not None:
+            raise InputError("A bandwidth is given, but the aim is another; maximize bandwidth.")
+        if self.aim is Aim.DRAG and (self.motion is None or len(self.motion) < 2):
+            raise InputError(
+                "Drag is what motor damping takes along a motion; give a motion (--motion), or "
+                "minimize damping."
+            )
+        if self.aim is Aim.BANDWIDTH and not pd_keys(self.system):
+            raise InputError(
+                f"{self.system.name} has no joint PD whose bandwidth could be set "
+                '(controller.kind = "joint_pd"); maximize stiffness.'
+            )
+
+
+def pd_keys(system: System) -> object | None:
+    """Return the keys of a project's joint PD; None if its law is another.
+
+    Args:
+        system: the design.
+    """
+    if system.source is None:
+        return None
+    keys = system.source.project.controller
+    return keys if keys.kind == "joint_pd" else None

@@ -1,0 +1,208 @@
+"""Which gain should I use? Largest stiffness or bandwidth, least damping, for a delay."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from sealag.design import System
+from sealag.errors import InputError, word
+from sealag.robot import Motion
+from sealag.tune._answer import Tuned, number_of, passive_bound
+from sealag.tune._gains import rounded
+from sealag.tune._joint_pd import joint_inertia, pd_design
+from sealag.tune._passive import EASE, Knobs, damped, least_of
+from sealag.tune._question import LARGEST_SAFETY, Aim, Number, Question, Share
+from sealag.tune._search import first_crossing
+from sealag.typing import Array
+from sealag.units import check_delay_s, time_text
+
+_SCALES = (1e-3, 1e4)
+"""Factors of the stiffness among which a margin is searched."""
+_BANDWIDTHS = (0.1, 1e4)
+"""rad/s: bandwidths that are searched."""
+_BELOW = 0.99
+"""Share of the passive gain at which a margin surely holds, whatever rounding says."""
+_BEYOND = 1.0 + 1e-3
+"""Factor beyond a limit at which a loop is asked what stopped it."""
+
+
+def tune(
+    system: System,
+    motion: Motion | None = None,
+    *,
+    aim: str = "stiffness",
+    number: str = "passive",
+    share: str = "common",
+    safety: float = 1.0,
+    delay: float | None = None,
+    bandwidth: float | None = None,
+    damping_ratio: float = 1.0,
+) -> Tuned:
+    """Find gains for a delay, over a posture or all instants of a motion (docs/theory section 16).
+
+    Args:
+        system: the design whose gains are changed.
+        motion: its instants; the posture if None.
+        aim: stiffness, the largest K_x or K_p; bandwidth, the largest ω of joint PD, or what a
+            given one tolerates; damping, the least trace D_θ; drag, the least energy that D_θ takes
+            along the motion.
+        number: the delay that must reach the required one: passive (closed form or a convex
+            program, certified), jitter or constant (the first crossing from small gains up).
+        share: what has a factor of its own: common (all tasks), task, or direction (of joint PD:
+            joint); the latter two maximise the geometric mean of the factors.
+        safety: factor on the delay, at least 1.
+        delay: what is tolerated, s; the design's d_1 if None. A shorter one scales the ways of its
+            connections.
+        bandwidth: ω of joint PD, rad/s; the largest that the delay leaves if None.
+        damping_ratio: ζ of joint PD.
+
+    Returns:
+        The gains, or why there are none; no gain is a result, not an error.
+
+    Raises:
+        InputError: a word is none, a number is out of range, or the parts do not fit together.
+        RobotError: a mass matrix is not positive definite.
+        SolverError: a solver gives up.
+    """
+    _check("safety", safety, 1.0, LARGEST_SAFETY)
+    _check("damping_ratio", damping_ratio, 0.0, 1e3)
+    if bandwidth is not None:
+        _check("bandwidth", bandwidth, *_BANDWIDTHS)
+    if delay is not None:
+        system = _delayed(system, delay)
+    question = Question(
+        system=system,
+        motion=motion,
+        aim=word(Aim, aim, what="aim"),
+        number=word(Number, number, what="number"),
+        share=word(Share, share, what="share"),
+        required=safety * system.delays.d_1,
+        bandwidth=bandwidth,
+        damping_ratio=damping_ratio,
+    )
+    if question.aim is Aim.BANDWIDTH:
+        return _bandwidth(question)
+    if question.aim is not Aim.STIFFNESS:
+        return _least_damping(question)
+    if question.number is Number.PASSIVE:
+        return _stiffest(question)
+    return _stiffest_by_margin(question)
+
+
+def _check(name: str, value: float, low: float, high: float) -> None:
+    if not (math.isfinite(value) and low <= value <= high):
+        raise InputError(f"{name} is {value:g}; it must lie in {low:g} … {high:g}.")
+
+
+def _delayed(system: System, delay: float) -> System:
+    """The design with its ways scaled so that d_1 is a delay; periods stay."""
+    check_delay_s(delay, "The delay")
+    own, periods = system.delays.d_1, system.delays.scaled(0.0).d_1
+    if delay < periods or (own == periods and delay != own):
+        raise InputError(
+            f"The delay is {time_text(delay)}, but the periods of the design's loops alone make "
+            f"{time_text(periods)} of its {time_text(own)}; change [delays]."
+        )
+    if own == periods:
+        return system
+    scaled = system.delays.scaled((delay - periods) / (own - periods))
+    return replace(system, delays=scaled)
+
+
+def _stiffest(question: Question) -> Tuned:
+    """Largest stiffness by the passive number: the closed form, or the fairest factors."""
+    knobs = Knobs(question)
+    _, at_limit = knobs.stiffest(question.required)
+    if at_limit.scale == 0.0:
+        return Tuned.none(question, "gravity compensation alone is stiffer than the delay allows")
+    factors, wall = knobs.stiffest(question.required * (1.0 + EASE))
+    names = {group.name: float(factor) for group, factor in zip(knobs.groups, factors)}
+    common = question.share is Share.COMMON
+    return Tuned.of(
+        question,
+        knobs.design(factors),
+        factors=names,
+        scale=float(factors[0]) if common else None,
+        limit=_limit(at_limit.scale) if common else _mean(knobs.stiffest(question.required)[0]),
+        spring_share=wall.spring,
+    )
+
+
+def _limit(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _mean(factors: Array) -> float:
+    """The geometric mean."""
+    return float(np.exp(np.log(factors).mean()))
+
+
+def _least_damping(question: Question) -> Tuned:
+    """Least damping by the passive number; a margin goes on from there in its direction."""
+    _, cost = damped(question, question.required)
+    design, _ = damped(question, question.required * (1.0 + EASE))
+    if question.number is Number.PASSIVE:
+        return Tuned.of(question, design, limit=cost)
+    drives, floor = design.actuators, least_of(question.system)
+
+    def less(factor: float) -> System:
+        damping = np.maximum(drives.motor_damping / factor, floor)
+        return rounded(replace(design, actuators=replace(drives, motor_damping=damping)), up=True)
+
+    return _searched(question, less, low=1.0, high=_SCALES[1])
+
+
+def _stiffest_by_margin(question: Question) -> Tuned:
+    """Largest common stiffness by the jitter or constant margin: the first crossing."""
+    knobs = Knobs(question)
+    low, high = _SCALES
+    design = knobs.design
+    # All factors below one whose passive bound is long enough have a margin of that length.
+    passive, _ = knobs.stiffest(question.required * (1.0 + EASE))
+    if passive_bound(question, design(passive)) >= question.required:
+        low = _BELOW * float(passive[0])
+    return _searched(question, lambda factor: design(np.array([factor])), low=low, high=high)
+
+
+def _bandwidth(question: Question) -> Tuned:
+    """Gains of joint PD for a bandwidth, or for the largest one."""
+    inertia = joint_inertia(question.system, question.motion)
+
+    def design(bandwidth: float) -> System:
+        return pd_design(question.system, inertia, bandwidth, question.damping_ratio)
+
+    if question.bandwidth is not None:
+        return Tuned.of(question, design(question.bandwidth), bandwidth_rad_s=question.bandwidth)
+    low, high = _BANDWIDTHS
+    return _searched(question, design, low=low, high=high)
+
+
+def _searched(
+    question: Question, design: Callable[[float], System], *, low: float, high: float
+) -> Tuned:
+    """The first crossing of a number from small gains up."""
+    required = question.required * (1.0 + EASE)
+
+    def holds(x: float) -> bool:
+        value, _ = number_of(question, design(x))
+        return value is not None and value >= required
+
+    x = first_crossing(holds, low=low, high=high)
+    name = "bandwidth" if question.aim is Aim.BANDWIDTH else "factor"
+    if x is None:
+        return Tuned.none(
+            question,
+            f"no {name} from {low:g} to {high:g} has the {question.number} number "
+            f"{time_text(question.required)}",
+        )
+    _, kind = number_of(question, design(x * _BEYOND))
+    return Tuned.of(
+        question,
+        design(x),
+        kind=kind,
+        limit=None if x >= high else x,
+        scale=x if question.aim is Aim.STIFFNESS else None,
+        bandwidth_rad_s=x if question.aim is Aim.BANDWIDTH else None,
+    )
