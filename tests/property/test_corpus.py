@@ -6,7 +6,7 @@
 import pytest
 
 from corpus.find import robots
-from corpus.run import Answer, contradictions, misspoken, taken
+from corpus.run import taken
 from helpers.robots import urdf_path
 
 FOLDER = urdf_path("example-robot-data:ur_description/urdf/ur5_robot.urdf").parents[2]

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from sealag import design
-from sealag.cli._commands import busy, compile_kernels, motion_of
+from sealag.cli._commands import busy, compile_kernels
 from sealag.cli._json import show_json
 from sealag.cli._terminal import show
 from sealag.design import System
@@ -36,7 +36,7 @@ def tune_project(
     delay = None if delay_ms is None else seconds_from_ms(delay_ms)
     if write is not None:
         _check_target(write, system, motion, delay)
-    along = motion_of(system, motion)
+    along = system.motion_of(motion)
     compile_kernels()
     with busy("tuning", along):
         tuned = tune(system, along, aim=word, bandwidth=bandwidth, delay=delay, **asked)
