@@ -7,8 +7,8 @@ from sealag.cli._commands import compile_kernels
 from sealag.cli._json import show_json
 from sealag.cli._terminal import show
 from sealag.errors import InputError
-from sealag.files import Draft, check_output, write_text
 from sealag.export import MujocoModel
+from sealag.files import Draft, check_output, write_text
 from sealag.units import seconds_from_ms, time_text
 
 TARGET = "mujoco"
