@@ -48,8 +48,22 @@ MotionFile = Annotated[
     Path | None,
     typer.Option(
         "--motion",
-        help="Motion to check: CSV, NPZ or Parquet with named columns. Default: the project's "
-        "motion, else its posture.",
+        help="Motion to check: CSV, NPZ or Parquet with named columns, or a recording (MCAP). "
+        "Default: the project's motion, else its posture.",
+    ),
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        help="Names in the motion's file: theirs=ours,…, or a TOML or JSON file of it.",
+    ),
+]
+Quaternion = Annotated[
+    str | None,
+    typer.Option(
+        "--quaternion",
+        help="Order of base_qx … base_qw: xyzw or wxyz. Default: xyzw, questioned.",
     ),
 ]
 
@@ -105,6 +119,8 @@ def init(
 def certify(
     project: Project,
     motion: MotionFile = None,
+    columns: Columns = None,
+    quaternion: Quaternion = None,
     criterion: Annotated[
         str | None,
         typer.Option("--criterion", help="certified or published. Default: the project's."),
@@ -147,6 +163,8 @@ def certify(
         certify_project(
             project,
             motion,
+            columns=columns,
+            quaternion=quaternion,
             criterion=criterion,
             time_varying=time_varying,
             proofs=proofs,
@@ -161,6 +179,8 @@ def certify(
 def margin(
     project: Project,
     motion: MotionFile = None,
+    columns: Columns = None,
+    quaternion: Quaternion = None,
     horizon_ms: Annotated[
         float | None,
         typer.Option("--horizon-ms", help="List ranges of stable delays up to this one."),
@@ -176,7 +196,15 @@ def margin(
     """Compute the exact local delay margin of the frozen closed loop, along a motion."""
     from sealag.cli._commands import margin_project
 
-    margin_project(project, motion, horizon_ms=horizon_ms, rate_sweep=rate_sweep, as_json=as_json)
+    margin_project(
+        project,
+        motion,
+        columns=columns,
+        quaternion=quaternion,
+        horizon_ms=horizon_ms,
+        rate_sweep=rate_sweep,
+        as_json=as_json,
+    )
 
 
 @app.command()
@@ -251,6 +279,8 @@ def verify(
         Path | None,
         typer.Option("--motion", help="Motion that was certified; needs --project."),
     ] = None,
+    columns: Columns = None,
+    quaternion: Quaternion = None,
     as_json: Json = False,
 ) -> None:
     """Check a certificate from its own numbers, or against its project; status 1 if it fails."""
@@ -263,6 +293,8 @@ def verify(
             second=second,
             project=project,
             motion=motion,
+            columns=columns,
+            quaternion=quaternion,
             as_json=as_json,
         )
     )

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from sealag import design
-from sealag.cli._commands import busy, compile_kernels
+from sealag.cli._commands import busy, compile_kernels, note
 from sealag.cli._json import show_json
 from sealag.cli._terminal import show
 from sealag.errors import InputError
@@ -30,6 +30,8 @@ def certify_project(
     project: str,
     motion: Path | None,
     *,
+    columns: str | None,
+    quaternion: str | None,
     criterion: str | None,
     time_varying: bool,
     proofs: str,
@@ -48,7 +50,7 @@ def certify_project(
     system = design.load(project)
     path = out or Path(f"{system.name}.certificate.json")
     check_output(path, *system.files, *([motion] if motion else []))
-    along = system.motion_of(motion)
+    along = system.motion_of(motion, columns=columns, quaternion=quaternion, tell=note)
     system.criterion_asked(along, criterion, time_varying=time_varying, proofs=count)
     with Draft(path) as draft:
         compile_kernels()

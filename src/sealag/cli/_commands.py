@@ -83,18 +83,29 @@ def busy(what: str, motion: Motion | None = None) -> Iterator[None]:
         yield
 
 
+def note(text: str) -> None:
+    """Show what was done with a file beside the answer.
+
+    Args:
+        text: the sentence.
+    """
+    show(f"sealag: {text}", error=True)
+
+
 def margin_project(
     project: str,
     motion: Path | None,
     *,
+    columns: str | None,
+    quaternion: str | None,
     horizon_ms: float | None,
     rate_sweep: bool,
     as_json: bool,
 ) -> None:
     """Show the exact local margin at every instant, or at a sample of a long motion."""
     if rate_sweep:
-        if motion is not None or horizon_ms is not None:
-            raise InputError("--rate-sweep is of the project's posture: leave out the other.")
+        if any(given is not None for given in (motion, columns, quaternion, horizon_ms)):
+            raise InputError("--rate-sweep is of the project's posture: leave out the others.")
         _sweep_rates(project, as_json=as_json)
         return
     if horizon_ms is not None and not 0.0 < horizon_ms <= LONGEST_HORIZON_MS:
@@ -104,7 +115,7 @@ def margin_project(
         )
     system = design.load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
-    along = system.motion_of(motion)
+    along = system.motion_of(motion, columns=columns, quaternion=quaternion, tell=note)
     compile_kernels()
     with busy("computing margins", along):
         found = system.local_margins(along, horizon=horizon)
@@ -164,24 +175,27 @@ def verify_certificate(
     second: bool,
     project: str | None,
     motion: Path | None,
+    columns: str | None,
+    quaternion: str | None,
     as_json: bool,
 ) -> int:
     """Check a certificate, against its project if one is given; 1 if it does not hold."""
     if second:
-        if exact or project is not None or motion is not None:
+        if exact or any(given is not None for given in (project, motion, columns, quaternion)):
             raise InputError(
                 "--second takes no --exact, --project or --motion: it reads the file alone."
             )
         return _second(path, as_json=as_json)
     if project is None:
-        if motion is not None:
-            raise InputError("--motion needs --project.")
+        if any(given is not None for given in (motion, columns, quaternion)):
+            raise InputError("--motion, --columns and --quaternion need --project.")
         result = Certificate.verify(path, exact=exact)
     else:
         Certificate.read(path)
         system = design.load(project)
+        along = system.motion_of(motion, columns=columns, quaternion=quaternion, tell=note)
         compile_kernels()
-        result = design.verify_design(path, system, motion, exact=exact)
+        result = design.verify_design(path, system, along, exact=exact)
     if as_json:
         show_json(result.to_json_dict())
     else:

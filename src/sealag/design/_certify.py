@@ -37,6 +37,7 @@ from sealag.passivity import (
     Worst,
 )
 from sealag.robot import Motion
+from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.units import time_text
 from sealag.version import __version__
@@ -108,7 +109,7 @@ class _Case:
 
 def certify(
     project: System | str | Path,
-    motion: Motion | str | Path | None = None,
+    motion: Motion | Run | str | Path | None = None,
     *,
     criterion: Criterion | str | None = None,
     time_varying: bool = False,
@@ -122,8 +123,8 @@ def certify(
 
     Args:
         project: the design, or its project file, `bundled:hume` among them.
-        motion: the motion, or its file; the project's own motion if None, or the posture where the
-            project names none.
+        motion: the motion, a run, or a file; the project's own motion if None, or the posture where
+            the project names none.
         criterion: certified (docs/theory section 6) or published ((29), (31) as printed); the
             system's own if None.
         time_varying: also bound the delay for matrices that move inside polytopes around the

@@ -1,72 +1,154 @@
-"""Motions as tables with named columns: CSV, NPZ or Parquet."""
+"""Motions as tables with named columns: CSV, NPZ, Parquet, and recordings of runs."""
 
-import csv
-import io
-import itertools
-import zipfile
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
-from sealag.errors import InputError, MotionError
-from sealag.files import opened, written_whole
+from sealag.design._base_pose import in_order, pose_from_contacts, question
+from sealag.design._design import Design
+from sealag.design._motion_names import TIME, Names, mapping_of
+from sealag.design._motion_table import CONTACT, RECORDING, read_table, recorded_columns
+from sealag.errors import InputError, MotionError, SealagError
+from sealag.files import written_whole
 from sealag.robot import Contact, Motion, Robot
+from sealag.simulation import Run
 from sealag.store import Store, blocks, release
 from sealag.typing import Array
-from sealag.units import number_of
 
-BASE_COLUMNS = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
-BASE_RATES = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
-CONTACT = "contact:"
-VELOCITY = ":velocity"
-LARGEST_BYTES = 2_000_000_000
 _LATEST = 1e12  # s
 _SHORTEST = 1e-9  # s between two rows, that velocities stay numbers
-_CSV_BLOCK = 10_000  # rows that are lists of Python numbers at a time
 
 
-def load_motion(path: str | Path, robot: Robot, *, contacts: Sequence[Contact] = ()) -> Motion:
+def load_motion(
+    path: str | Path,
+    system: Design,
+    *,
+    columns: Mapping[str, str] | str | Path | None,
+    quaternion: str | None,
+    tell: Callable[[str], None],
+) -> Motion:
     """Read what `System.load_motion` reads.
 
     Args:
         path: the file.
-        robot: whose motion it is.
-        contacts: those that hold or not.
+        system: robot, contacts and posture.
+        columns: what the file's columns are called here.
+        quaternion: the order of base_qx … base_qw; None for xyzw, which is questioned.
+        tell: called with each sentence on what was done with the file.
     """
-    path = Path(path)
-    table = _read_table(path)
-    known = _known_columns(robot, contacts)
-    unknown = [name for name in table if name not in known]
-    if unknown:
-        raise MotionError(
-            f"{path}: the column {unknown[0]!r} is not known; expected are time_s, "
-            f"{'base_x … base_qw, ' if robot.floating_base else ''}{', '.join(robot.joints)}."
+    path, notes = Path(path), list[str]()
+    names = Names(
+        robot=system.robot,
+        contacts=system.contacts,
+        mapping=mapping_of(columns),
+        path=path,
+        tell=notes.append,
+    )
+    try:
+        table = read_table(path, names.choose)
+        time = next(iter(table))
+        table = {TIME: names.seconds(time, table.pop(time)), **table}
+        motion = _motion(
+            {name: np.asarray(values, dtype=float) for name, values in table.items()},
+            system,
+            path=path,
+            recorded=path.suffix.lower() == RECORDING,
+            quaternion=quaternion,
+            tell=notes.append,
         )
-    needed = ["time_s", *(BASE_COLUMNS if robot.floating_base else ()), *robot.joints]
-    missing = [name for name in needed if name not in table]
-    if missing:
-        raise MotionError(f"{path}: the column {missing[0]} is missing ({len(missing)} in all).")
+    except SealagError as error:
+        error.at(path)
+        raise
+    for note in notes:
+        tell(note)
+    return motion
+
+
+def motion_of_run(run: Run, system: Design) -> Motion:
+    """Return what a run moved through.
+
+    Args:
+        run: the run.
+        system: robot, contacts and posture.
+
+    Raises:
+        InputError: it is a run of another robot.
+        MotionError: a joint left its limits.
+    """
+    robot = system.robot
+    if run.joints != robot.joints or run.q.shape[1] != robot.nq:
+        raise InputError(
+            f"The run is of {', '.join(run.joints)}, the design's joints are "
+            f"{', '.join(robot.joints)}; take a run of this design."
+        )
+    names = (
+        *Motion.position_columns(robot.joints, floating_base=robot.floating_base),
+        *Motion.velocity_columns(robot.joints, floating_base=robot.floating_base),
+    )
+    signals = {
+        "/time": {TIME: run.time},
+        "/joint_states": dict(zip(names, (*run.q.T, *run.v.T), strict=True)),
+        "/contact": run.signals().get("/contact", {}),
+    }
+    table = recorded_columns(signals)
+    known = [CONTACT + contact.frame for contact in system.contacts]
+    other = [name for name in table if name.startswith(CONTACT) and name not in known]
+    if other:
+        raise MotionError(
+            f"The run stood on {other[0].removeprefix(CONTACT)}, which is no contact of the "
+            "design; take a run of this design."
+        )
+    return _motion(
+        table, system, path=Path("run"), recorded=True, quaternion=None, tell=lambda _: None
+    )
+
+
+def _motion(
+    table: dict[str, Array],
+    system: Design,
+    *,
+    path: Path,
+    recorded: bool,
+    quaternion: str | None,
+    tell: Callable[[str], None],
+) -> Motion:
+    """The motion of a table with its own names and times in s.
+
+    In a recording a contact of which nothing is said has not held; elsewhere it holds. Its
+    quaternions are sealag's own.
+    """
+    robot, contacts = system.robot, system.contacts
     _check_rows(table, path)
-    time = table["time_s"]
+    time = table[TIME]
     store = Store.of(
         len(time), robot.nq + robot.nv, what="A motion", remedy="give fewer of its rows"
     )
-    q = _filled(store, [table[name] for name in needed[1:]])
-    if robot.floating_base:
-        q[:, 3:7] = _unit(q[:, 3:7], path)
+    names = Motion.position_columns(robot.joints, floating_base=robot.floating_base)
+    free = robot.floating_base and names[0] not in table
+    q = _filled(store, len(time), [table.get(name) for name in names])
+    held = _held(table, contacts, unsaid=not recorded)
+    if free:
+        moved = pose_from_contacts(q, held, contacts, robot, posture=system.posture, path=path)
+        frames = ", ".join(contact.frame for contact in contacts)
+        tell(
+            f"{path}: the base's pose comes from the contacts {frames}, held where the project's "
+            f"posture puts them; they move by {moved * 1e3:.2g} mm at most"
+        )
+    elif robot.floating_base:
+        q[:, 3:7] = _unit(in_order(q[:, 3:7], quaternion or "xyzw"), path)
+        if quaternion is None and not recorded:
+            question(q[:, 3:7], time, system.posture, path)
         release(q)
     try:
         robot.require_within_limits(q)
     except InputError as error:
         raise MotionError(f"{path}: {error}") from error
-    sets, index = _contact_sets(table, contacts)
+    sets, index = _contact_sets(held, contacts)
     motion = Motion(
         time=time,
         q=q,
-        v=_velocities(table, robot, q, path=path, store=store),
+        v=_velocities(table, robot, q, path=path, store=store, tell=tell),
         contact_sets=sets,
         contact_index=index,
     )
@@ -82,7 +164,7 @@ def _check_rows(table: dict[str, Array], path: Path) -> None:
         if not len(column):
             raise MotionError(f"{path} has no rows below its column names; at least one is needed.")
         bad, need = ~np.isfinite(column), "a finite number"
-        if name == "time_s":
+        if name == TIME:
             bad |= np.abs(column) > _LATEST
             if not bad.any():
                 bad[1:] = np.diff(column) < _SHORTEST
@@ -110,126 +192,41 @@ def _unit(quaternions: Array, path: Path) -> Array:
     return quaternions / norm[:, None]
 
 
-def _known_columns(robot: Robot, contacts: Sequence[Contact]) -> set[str]:
-    known = {"time_s", *robot.joints, *(name + VELOCITY for name in robot.joints)}
-    known |= {CONTACT + contact.frame for contact in contacts}
-    return known | {*BASE_COLUMNS, *BASE_RATES} if robot.floating_base else known
-
-
-def _read_table(path: Path) -> dict[str, Array]:
-    ending = path.suffix.lower()
-    if ending not in _READERS:
-        raise MotionError(
-            f"{path}: motions end in .csv, .npz or .parquet, not {ending or 'nothing'!r}."
-        )
-    with opened(path, what="The motion", largest=LARGEST_BYTES) as file:
-        try:
-            table = _READERS[ending](file, path)
-        except MotionError:
-            raise
-        except Exception as error:
-            reason = " ".join(str(error).split())[:200].rstrip(".")
-            raise MotionError(f"{path} cannot be read as a motion: {reason}.") from error
-    return {name: _column(values, name, path) for name, values in table.items()}
-
-
-def _column(values: Array, name: str, path: Path) -> Array:
-    """A column as doubles, (N,)."""
-    rows = max(values.shape, default=1)
-    if values.dtype.kind not in "fiub" or values.size != rows:
-        raise MotionError(
-            f"{path}: the column {name} has type {values.dtype} and shape {values.shape}; one real "
-            "number a row is needed."
-        )
-    return values.astype(float, copy=False).ravel()
-
-
-def _read_npz(file: BinaryIO, path: Path) -> dict[str, Array]:
-    if not zipfile.is_zipfile(file):
-        raise MotionError(f"{path} is not an NPZ file of named columns; np.savez writes one.")
-    file.seek(0)
-    data = np.load(file, allow_pickle=False)
-    return {name: data[name] for name in data}
-
-
-def _read_parquet(file: BinaryIO, path: Path) -> dict[str, Array]:
-    from pyarrow import parquet
-
-    found = parquet.ParquetFile(file)
-    names = found.schema_arrow.names
-    return {name: found.read([name])[name].to_numpy() for name in names}
-
-
-def _read_csv(file: BinaryIO, path: Path) -> dict[str, Array]:
-    text = io.TextIOWrapper(file, encoding="utf-8-sig", newline="")
-    lines = csv.reader(text, strict=True)
-    names = [name.strip() for name in next(lines, [])]
-    if not names or number_of(names[0]) is not None:
-        raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
-    if ";" in names[0]:
-        raise MotionError(f"{path} has semicolons between its cells; commas are right.")
-    twice = next((name for name, count in Counter(names).items() if count > 1), None)
-    if twice is not None:
-        raise MotionError(f"{path}: the column name {twice!r} occurs twice.")
-    whole: list[Array] = []
-    rows = _csv_rows(lines, names, path)
-    while block := list(itertools.islice(rows, _CSV_BLOCK)):
-        whole.append(np.array(block, dtype=float))
-    text.detach()
-    columns = np.concatenate([np.zeros((0, len(names))), *whole])
-    return dict(zip(names, columns.T, strict=True))
-
-
-def _csv_rows(
-    lines: Iterator[list[str]], names: list[str], path: Path
-) -> Iterator[list[float | None]]:
-    """The numbers of each row."""
-    row = 0
-    for cells in lines:
-        if not cells:
-            continue
-        row += 1
-        numbers = [number_of(cell) for cell in cells]
-        if len(cells) != len(names):
-            raise MotionError(
-                f"{path}: row {row} has {len(cells)} cells, but there are {len(names)} "
-                "column names; cells are separated by commas, decimals by points."
-            )
-        if None in numbers:
-            at = numbers.index(None)
-            raise MotionError(
-                f"{path}: the column {names[at]} is {cells[at]!r} in row {row}; it must "
-                "be a number."
-            )
-        yield numbers
-
-
-_READERS = {".csv": _read_csv, ".npz": _read_npz, ".parquet": _read_parquet}
-
-
-def _filled(store: Store, columns: list[Array]) -> Array:
-    """The columns side by side, (N, k)."""
-    array = store.zeros((len(columns[0]), len(columns)))
-    for rows in blocks(len(array)):
-        array[rows] = np.column_stack([column[rows] for column in columns])
+def _filled(store: Store, count: int, columns: Sequence[Array | None]) -> Array:
+    """The columns side by side, (N, k); 0 where there is none."""
+    array = store.zeros((count, len(columns)))
+    for rows in blocks(count):
+        for k, column in enumerate(columns):
+            if column is not None:
+                array[rows, k] = column[rows]
         release(array)
     return array
 
 
 def _velocities(
-    table: dict[str, Array], robot: Robot, q: Array, *, path: Path, store: Store
+    table: dict[str, Array],
+    robot: Robot,
+    q: Array,
+    *,
+    path: Path,
+    store: Store,
+    tell: Callable[[str], None],
 ) -> Array:
-    names = [*(BASE_RATES if robot.floating_base else ()), *(j + VELOCITY for j in robot.joints)]
+    names = Motion.velocity_columns(robot.joints, floating_base=robot.floating_base)
     missing = [name for name in names if name not in table]
     if not missing:
-        return _filled(store, [table[name] for name in names])
+        return _filled(store, len(q), [table[name] for name in names])
     given = [name for name in names if name in table]
-    if given:
+    if given == list(names[robot.nv_base :]):
+        tell(
+            f"{path}: the base's velocity is not given; all velocities are differences of positions"
+        )
+    elif given:
         raise MotionError(
             f"{path}: the velocity {given[0]} is given without {missing[0]}; give all velocities, "
             "or none, then they are differences of the positions."
         )
-    time, v = table["time_s"], store.zeros((len(q), robot.nv))
+    time, v = table[TIME], store.zeros((len(q), robot.nv))
     rate = None
     for rows in blocks(len(time) - 1):
         for row in range(rows.start, rows.stop):
@@ -241,14 +238,18 @@ def _velocities(
     return v
 
 
-def _contact_sets(
-    table: dict[str, Array], contacts: Sequence[Contact]
-) -> tuple[tuple[tuple[Contact, ...], ...], Array]:
-    count = len(table["time_s"])
-    on = np.ones((count, len(contacts)), dtype=bool)
+def _held(table: dict[str, Array], contacts: Sequence[Contact], *, unsaid: bool) -> Array:
+    """Whether each contact holds in each row, (N, contacts)."""
+    on = np.full((len(table[TIME]), len(contacts)), unsaid)
     for k, contact in enumerate(contacts):
         if CONTACT + contact.frame in table:
             on[:, k] = table[CONTACT + contact.frame] == 1.0
+    return on
+
+
+def _contact_sets(
+    on: Array, contacts: Sequence[Contact]
+) -> tuple[tuple[tuple[Contact, ...], ...], Array]:
     patterns, index = np.unique(on, axis=0, return_inverse=True)
     sets = tuple(
         tuple(contact for contact, held in zip(contacts, pattern, strict=True) if held)
@@ -264,9 +265,9 @@ def motion_table(motion: Motion, robot: Robot) -> dict[str, Array]:
         motion: the motion.
         robot: whose motion it is.
     """
-    positions = [*(BASE_COLUMNS if robot.floating_base else ()), *robot.joints]
-    rates = [*(BASE_RATES if robot.floating_base else ()), *(j + VELOCITY for j in robot.joints)]
-    table = {"time_s": motion.time}
+    positions = Motion.position_columns(robot.joints, floating_base=robot.floating_base)
+    rates = Motion.velocity_columns(robot.joints, floating_base=robot.floating_base)
+    table = {TIME: motion.time}
     table |= dict(zip(positions, motion.q.T, strict=True))
     table |= dict(zip(rates, motion.v.T, strict=True))
     frames = {contact.frame for contacts in motion.contact_sets for contact in contacts}

@@ -14,6 +14,7 @@ from sealag.design._system import System
 from sealag.errors import InputError
 from sealag.passivity import Certificate, Criterion, InstantProof, LocalLoop, Verification
 from sealag.robot import Motion
+from sealag.simulation import Run
 from sealag.typing import Array
 
 _Check = tuple[str, bool, str]
@@ -39,7 +40,7 @@ at different points. `verify` checks them from the file; the checks below compar
 def verify_design(
     certificate: Path | str | Mapping[str, Any],
     project: System | str | Path,
-    motion: Motion | str | Path | None = None,
+    motion: Motion | Run | str | Path | None = None,
     *,
     exact: bool = False,
 ) -> Verification:
@@ -70,11 +71,10 @@ def verify_design(
     claimed = Certificate.read(certificate)
     count = claimed.question.instants
     system = loaded(project)
-    if motion is None and system.motion_file is None and count > 1:
+    along = system.motion_of(motion)
+    if len(along) == 1 < count:
         raise InputError(f"The certificate is of a motion of {count} instants; name it (--motion).")
-    if not found.valid:
-        return found
-    return found.extended(_recomputed(claimed, system, system.motion_of(motion)))
+    return found.extended(_recomputed(claimed, system, along)) if found.valid else found
 
 
 def _recomputed(claimed: Certificate, system: System, motion: Motion) -> Iterator[_Check]:

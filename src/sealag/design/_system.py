@@ -1,25 +1,24 @@
 """A design that answers: bounds, margins, motions and runs."""
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sealag.design._along import Along
 from sealag.design._criteria import certified_bounds
 from sealag.design._design import Design
 from sealag.design._local import Local, local_of
 from sealag.design._margins import LocalMargins, local_margins
-from sealag.design._motion_file import load_motion, save_motion
+from sealag.design._motion_file import load_motion, motion_of_run, save_motion
 from sealag.design._rates import RATES, Rate, rate_sweep
 from sealag.errors import InputError, either
 from sealag.passivity import Bound, Criterion
 from sealag.robot import Motion
+from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.whole_body import Rest, Spaces
-
-if TYPE_CHECKING:
-    from sealag.simulation import Run
 
 MOST_INSTANTS = 1_400_000
 """Instants of one certificate: its file has at most 100 MB, and up to 70 bytes an instant."""
@@ -50,48 +49,82 @@ class System(Design):
         source: the project file that it was read from; None if it was built in Python.
     """
 
-    def load_motion(self, path: str | Path) -> Motion:
-        """Read a motion from a CSV, NPZ or Parquet file with one named column each.
+    def load_motion(
+        self,
+        path: str | Path,
+        *,
+        columns: Mapping[str, str] | str | Path | None = None,
+        quaternion: str | None = None,
+        tell: Callable[[str], None] = warnings.warn,
+    ) -> Motion:
+        """Read a motion from a table with named columns, in any order: CSV, NPZ, Parquet, or a
+        recording (MCAP) of a run.
 
-        Columns: `time_s`; for a floating base `base_x … base_z` (m) and `base_qx … base_qw`; one
-        for each joint by its name (rad or m). Optional: `<joint>:velocity` for all joints together
-        with `base_vx … base_wz` in the base frame, else velocities are differences of
-        configurations; and `contact:<frame>` with 1 where the design's contact at this frame holds,
-        else all hold.
+        Columns: a time, `time_s`, or `time_ms`, `time_us`, `time_ns`, `stamp_ns` and their like;
+        for a floating base `base_x … base_z` (m) and `base_qx … base_qw`; one for each joint by its
+        name (rad or m). Optional: `<joint>:velocity` for all joints together with
+        `base_vx … base_wz` in the base frame, else velocities are differences of configurations;
+        and `contact:<frame>` with 1 where the design's contact at this frame holds, else all hold.
+        In an NPZ also `name` (n,), `position` and `velocity` (N, n) of ROS's JointState. Other
+        columns are left out. Without the base's pose it is where contacts stay as they are, from
+        the posture on, if three points or a surface hold. In a recording a contact holds where all
+        of its points stick. A date as time begins at 0.
 
         Args:
             path: the file; its ending tells the format.
+            columns: which of its columns are which of these: a mapping, `theirs=ours,…`, or a TOML
+                or JSON file.
+            quaternion: order of base_qx … base_qw in the file, xyzw or wxyz; None for xyzw, if the
+                base is not turned over against the posture and does not jump.
+            tell: called with each sentence on what was left out or taken for granted.
 
         Returns:
             The motion.
 
         Raises:
             FileError: the file cannot be read.
-            MotionError: a column is unknown, missing or holds no real numbers, a row is not finite,
-                time does not increase, a quaternion is not one, a joint is outside its limits, a
-                contact is neither 0 nor 1, or only some velocities are given.
+            InputError: columns or quaternion are neither of these.
+            MotionError: a column is missing or holds no real numbers, a time does not say its unit,
+                a row is not finite, time does not increase, a quaternion is not one or looks as if
+                w came first, a joint is outside its limits, a contact is none of the design's or
+                neither 0 nor 1, contacts leave the base free or contradict the joints, or only some
+                velocities are given.
         """
-        return load_motion(path, self.robot, contacts=self.contacts)
+        return load_motion(path, self, columns=columns, quaternion=quaternion, tell=tell)
 
-    def motion_of(self, given: Motion | str | Path | None = None) -> Motion:
+    def motion_of(
+        self,
+        given: Motion | Run | str | Path | None = None,
+        *,
+        columns: Mapping[str, str] | str | Path | None = None,
+        quaternion: str | None = None,
+        tell: Callable[[str], None] = warnings.warn,
+    ) -> Motion:
         """Return the motion that an answer is of.
 
         Args:
-            given: a motion, or its file; None for the project's own motion, or the posture where
-                the project names none. `still` is always the posture.
+            given: a motion, a run, or a file; None for the project's own motion, or the posture
+                where the project names none. `still` is always the posture.
+            columns: for a file, as `load_motion` takes it.
+            quaternion: for a file, as `load_motion` takes it.
+            tell: for a file, as `load_motion` takes it.
 
         Raises:
-            InputError: it is none of these.
+            InputError: it is none of these, or a run of another robot.
             FileError: as `load_motion` raises it; so MotionError.
         """
         chosen = self.motion_file if given is None else given
+        if isinstance(chosen, str | Path):
+            return self.load_motion(chosen, columns=columns, quaternion=quaternion, tell=tell)
+        if columns is not None or quaternion is not None:
+            raise InputError("columns and quaternion are of a motion's file; name it (--motion).")
         if chosen is None:
             return self.still()
-        if isinstance(chosen, Motion):
-            return chosen
-        if not isinstance(chosen, str | Path):
-            raise InputError(f"motion is {chosen!r}; a Motion or the path of its file is needed.")
-        return self.load_motion(chosen)
+        if isinstance(chosen, Run):
+            return motion_of_run(chosen, self)
+        if not isinstance(chosen, Motion):
+            raise InputError(f"motion is {chosen!r}; a Motion, a Run or a file's path is needed.")
+        return chosen
 
     def save_motion(self, motion: Motion, path: str | Path) -> None:
         """Write a motion of the robot as CSV, NPZ or Parquet through a temporary name.
@@ -119,7 +152,7 @@ class System(Design):
         return local_of(Along.of(self, motion), bounds, rest)
 
     def local_margins(
-        self, motion: Motion | str | Path | None = None, *, horizon: float | None = None
+        self, motion: Motion | Run | str | Path | None = None, *, horizon: float | None = None
     ) -> LocalMargins:
         """Decide the exact local margin of the law that runs, and its jitter margin, over a motion.
 
@@ -179,7 +212,7 @@ class System(Design):
 
     def criterion_asked(
         self,
-        motion: Motion | str | Path | None = None,
+        motion: Motion | Run | str | Path | None = None,
         criterion: Criterion | str | None = None,
         *,
         time_varying: bool = False,
@@ -215,7 +248,7 @@ class System(Design):
             )
         return Criterion(name)
 
-    def simulate(self, **choices: Any) -> "Run":
+    def simulate(self, **choices: Any) -> Run:
         """Run the controller on the delayed robot; see `sealag.simulate` for the choices."""
         from sealag.design._simulate import run_design
 

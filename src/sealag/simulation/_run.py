@@ -117,7 +117,8 @@ class Run:
             "/torque/spring": (self.tau_sea, "nm"),
             "/torque/motor": (self.tau_motor, "nm"),
         }
-        found = {
+        found = {"/base": self._base(rows)}
+        found |= {
             topic: self._by_joint(values[rows], unit) for topic, (values, unit) in by_joint.items()
         }
         rates = self.v[rows, -len(self.joints) :]
@@ -129,6 +130,17 @@ class Run:
             "/contact": _contacts(self, rows),
         }
         return {topic: columns for topic, columns in found.items() if columns}
+
+    def _base(self, rows: slice) -> dict[str, Array]:
+        """Pose and velocity of a floating base, named as in a motion file."""
+        joints = len(self.joints)
+        if self.q.shape[1] == joints:
+            return {}
+        names = (
+            *Motion.position_columns((), floating_base=True),
+            *Motion.velocity_columns((), floating_base=True),
+        )
+        return dict(zip(names, (*self.q[rows, :-joints].T, *self.v[rows, :-joints].T), strict=True))
 
     def _by_joint(self, values: Array, unit: str) -> dict[str, Array]:
         return {f"{joint}_{unit}": one for joint, one in zip(self.joints, values.T, strict=True)}
@@ -148,12 +160,14 @@ class Run:
             InputError: pandas is not installed.
         """
         pandas = extra("pandas", use="Run.to_pandas")
-        floating = self.q.shape[1] > len(self.joints)
-        positions = Motion.position_columns(self.joints, floating_base=floating)
-        rates = Motion.velocity_columns(self.joints, floating_base=floating)
-        columns = dict(zip((*positions, *rates), (*self.q.T, *self.v.T), strict=True))
-        for topic, signals in self.signals().items():
-            columns |= {f"{topic[1:]}/{name}": values for name, values in signals.items()}
+        signals = self.signals()
+        columns = signals.pop("/base", {})
+        n = len(self.joints)
+        columns |= dict(zip(self.joints, self.q.T[-n:], strict=True))
+        rates = Motion.velocity_columns(self.joints, floating_base=False)
+        columns |= dict(zip(rates, self.v.T[-n:], strict=True))
+        for topic, named in signals.items():
+            columns |= {f"{topic[1:]}/{name}": values for name, values in named.items()}
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time_s"))
 
     def summary(self, *, recording: Path) -> dict[str, Any]:
