@@ -58,6 +58,18 @@ def test_visuals_may_be_of_any_form(tmp_path):
     same_dynamics(read(tmp_path, odd), read(tmp_path, PLAIN))
 
 
+def test_blank_lines_may_come_before_the_declaration(tmp_path):
+    same_dynamics(read(tmp_path, '\n <?xml version="1.0"?>' + PLAIN), read(tmp_path, PLAIN))
+
+
+def test_without_a_usable_joint_each_reason_is_told(tmp_path):
+    free = '<joint name="j" type="planar"><parent link="base"/><child link="a"/></joint>'
+    fixed = joint("f", "base", "b", kind="fixed")
+    text = robot(link("base"), link("a"), link("b"), free, fixed)
+    with pytest.raises(RobotError, match=r"no joint can be actuated: j has more than one"):
+        read(tmp_path, text, floating_base=True, skip_unusable=True)
+
+
 def test_the_hash_is_of_the_file_as_it_is(tmp_path):
     text = PLAIN.replace(HEAD, HEAD + FOREIGN["undeclared prefix"])
     found = read(tmp_path, text)

@@ -59,8 +59,8 @@ def read_document(path: Path) -> Document:
 
 
 def _has_macros(root: Element) -> bool:
-    """Whether a file has macros of xacro left to expand."""
-    return any(
-        element.tag.startswith("xacro:") or any("${" in value for value in element.attrib.values())
-        for element in root.iter()
+    """Whether a file has macros of xacro left to expand; $(find) alone is in names of meshes."""
+    values = [value for element in root.iter() for value in element.attrib.values()]
+    return any(element.tag.startswith("xacro:") for element in root.iter()) or any(
+        "${" in value or "$(" in value.replace("$(find", "") for value in values
     )

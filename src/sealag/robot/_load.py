@@ -343,7 +343,7 @@ def _actuated(said: Description, path: Path, *, actuated: Sequence[str] | None) 
     if len(set(names)) < len(names):
         raise RobotError(f"{path}: an actuated joint is listed twice.")
     if not names:
-        raise RobotError(f"{path}: no joint is actuated.")
+        raise RobotError(f"{path}: no joint is actuated; one at least must be.")
     return names
 
 

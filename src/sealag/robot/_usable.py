@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from sealag.errors import RobotError
 from sealag.robot._load import Description, not_actuated, reduce_model, weak_joints
 from sealag.robot._mimic import couple
 from sealag.robot._urdf import ROOT_JOINT
@@ -41,6 +42,9 @@ def usable_joints(said: Description, path: Path) -> Usable:
             skipped[name] = problem
     while True:
         names = [name for name in said.movable if name not in {**skipped, **said.followers}]
+        if skipped and not names:
+            reasons = "; ".join(f"{name} {why}" for name, why in skipped.items())
+            raise RobotError(f"{path}: no joint can be actuated: {reasons}.")
         reduced, followers = reduce_model(said, path, actuated=names)
         weak = weak_joints(reduced, couple(reduced, followers), path)
         if not weak or ROOT_JOINT in weak:

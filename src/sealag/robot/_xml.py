@@ -13,6 +13,8 @@ LARGEST_BYTES = 50_000_000
 def parse_xml(content: bytes, path: Path) -> Element:
     """Parse XML without regard to namespaces: prefixes need not be declared, as in many URDFs.
 
+    Blank lines before the XML declaration are passed over, too.
+
     Args:
         content: the file's bytes.
         path: what messages call it.
@@ -23,7 +25,7 @@ def parse_xml(content: bytes, path: Path) -> Element:
     builder, parser = TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     try:
-        parser.Parse(content, True)
+        parser.Parse(content.lstrip(), True)
     except (expat.ExpatError, ValueError, LookupError) as error:  # the last two: odd encodings
         raise RobotError(f"{path} is not well-formed XML: {error}.") from error
     return builder.close()
