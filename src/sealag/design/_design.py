@@ -9,6 +9,7 @@ import numpy as np
 
 from sealag.actuation import Actuators
 from sealag.delay import Delays
+from sealag.design._matrices import Matrices
 from sealag.design._schema import Project, SimulationSection
 from sealag.errors import InputError
 from sealag.passivity import Criterion
@@ -192,6 +193,7 @@ class Design:
         *,
         rest: Rest | None = None,
         beside: float | None = None,
+        period: float | None = None,
     ) -> FrozenLoop:
         """Return the closed loop of the law that runs, where it rests.
 
@@ -200,12 +202,14 @@ class Design:
             instant: which one.
             rest: where the loop rests, if that is known already.
             beside: see `FrozenLoop.of`.
+            period: of the clock that a program with memory ticks at, s; the design's if None.
 
         Raises:
             ContractionError: q̄(θ) is fed back and does not exist.
+            InputError: a program's controller cannot be frozen.
         """
         if self.program is not None:
-            return self._frozen_program().loop
+            return self._frozen_program(period).loop
         q, contacts = self._held(motion, instant)
         return FrozenLoop.of(
             self.robot,
@@ -229,9 +233,16 @@ class Design:
         """
         if self.program is not None:
             raise InputError(
-                f"{what} those of a law, and the controller of {self.name} is a program, of which "
-                "only its ticks are known; `sealag margin` freezes it."
+                f"{what} those of a law, and the controller of {self.name} is {self.no_law}; "
+                "`sealag margin` freezes it."
             )
+
+    @property
+    def no_law(self) -> str:
+        """What the controller is instead of a law whose potential is known; empty for a law."""
+        if isinstance(self.program, Matrices):
+            return "given as matrices, which state no potential"
+        return "a program, of which only its ticks are known" if self.program else ""
 
     @property
     def ideal_drives(self) -> bool:
@@ -281,8 +292,9 @@ class Design:
             return self.posture, self.contacts
         return motion.q[instant], motion.contact_sets[motion.contact_index[instant]]
 
-    def _frozen_program(self):
-        """The loop of the program's controller, differentiated as it ticks, and where it rests."""
+    def _frozen_program(self, period: float | None = None):
+        """The program's controller about the posture, frozen as it ticks, at another period (s) if
+        one is given."""
         assert self.program is not None
         return freeze(
             self.program(self),
@@ -290,6 +302,6 @@ class Design:
             self.actuators,
             contacts=self.contacts,
             q=self.posture,
-            period=self.delays.sample_time or 1e-3,
+            period=period or self.delays.sample_time,
             embedded_delay=self.delays.torque_feedback_delay,
         )

@@ -30,7 +30,8 @@ class LocalMargins:
             every delay that varies as it likes below it; 0 where no bound covers the design.
         not_passive: why none does, in words; empty if one does.
         jitter_s: smallest jitter margin over the instants, s: stable for every delay that varies as
-            it likes below it; 0 where the loop is unstable without delay, None if not known.
+            it likes below it; 0 where the loop is unstable without delay, None if not known. Of a
+            controller with memory while one of both ways varies and the other is constant.
         channels_s: exact margin at the critical instant if only the position signals, or only the
             rates, of the command are late, s; empty if it feeds back no rates.
         frequency_rad_s: frequency of that pair, rad/s; None without one.
@@ -130,12 +131,12 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
 
 
 def _of_program(along: Along, horizon: float | None) -> LocalMargins:
-    """The margins of a controller that only its ticks are known of, in its posture."""
+    """The margins of a controller that is no law, in its posture."""
     system = along.system
     if len(along.motion) > 1:
         raise InputError(
-            f"The controller of {system.name} is a program, which is frozen in the posture that it "
-            "holds: leave the motion out."
+            f"The controller of {system.name} is {system.no_law}: it is frozen in the posture that "
+            "it holds; leave the motion out."
         )
     loop = system.frozen()
     margin = loop.margin(horizon=horizon)
@@ -144,8 +145,8 @@ def _of_program(along: Along, horizon: float | None) -> LocalMargins:
         delay_s=float(margin.delay),
         first_crossing_s=first,
         passive_s=0.0,
-        not_passive="the controller is a program, of which only its ticks are known",
-        jitter_s=0.0 if margin.unstable_roots else float(loop.jitter_margin().delay),
+        not_passive=f"the controller is {system.no_law}",
+        jitter_s=0.0 if margin.unstable_roots else min(loop.jitter_ways().values()),
         channels_s=loop.channels(),
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=_shares(loop, margin, system.robot.joints),

@@ -21,11 +21,13 @@ from sealag.delay import (
     Table,
 )
 from sealag.design._design import Source
+from sealag.design._matrices import matrices_of
 from sealag.design._plain_words import first_problem
 from sealag.design._program import program_of
 from sealag.design._schema import (
     AXES,
     JointPdKeys,
+    MatrixKeys,
     ProgramKeys,
     Project,
     SamplesDelay,
@@ -171,10 +173,15 @@ def _system(project: Project, path: Path, text: str) -> System:
         kd = _by_joint(project.controller.kd, robot, path, "controller.kd")
         actuators = replace(actuators, motor_damping=actuators.motor_damping + kd)
     program, program_file = None, None
-    if isinstance(project.controller, ProgramKeys):
-        program_file = folder / project.controller.file
-        with _named(path, "controller.file"):
-            program = program_of(program_file, project.controller.function)
+    match project.controller:
+        case ProgramKeys() as keys:
+            program_file = folder / keys.file
+            with _named(path, "controller.file"):
+                program = program_of(program_file, keys.function)
+        case MatrixKeys() as keys:
+            program_file = folder / keys.file if keys.file is not None else None
+            with _named(path, "controller"):
+                program = matrices_of(keys, robot, folder, project.delays.sample_time_ms * 1e-3)
     with _named(path, "simulation.pushes"):
         for push in project.simulation.pushes:
             robot.check_frame(push.frame)
@@ -216,9 +223,12 @@ def _law(project: Project, robot: Robot, path: Path) -> Law:
             f'{path}: [[tasks]] are given, but controller.kind is "{keys.kind}", which has none; '
             'remove them, or let the kind be "wbosc".'
         )
-    if isinstance(keys, ProgramKeys):
+    if isinstance(keys, ProgramKeys | MatrixKeys):
         nothing = Task(name="none", kind=TaskKind.POSTURE, stiffness=np.zeros(robot.n))
-        return Law(tasks=(nothing,), gravity=GravityCompensation.NONE)
+        gravity = GravityCompensation.NONE
+        if isinstance(keys, MatrixKeys):
+            gravity = GravityCompensation.PLANNED
+        return Law(tasks=(nothing,), gravity=gravity)
     if isinstance(keys, JointPdKeys):
         late = keys.damping_at == "controller"
         joints = Task(
@@ -261,7 +271,7 @@ def _by_joint(given: float | dict[str, float], robot: Robot, path: Path, key: st
     return np.array([given[name] for name in robot.joints])
 
 
-def _criterion(keys: WholeBodyKeys | JointPdKeys | ProgramKeys) -> Criterion:
+def _criterion(keys: Any) -> Criterion:
     return Criterion(keys.criterion) if isinstance(keys, WholeBodyKeys) else Criterion.CERTIFIED
 
 

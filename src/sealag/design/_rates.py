@@ -10,6 +10,7 @@ from sealag.design._design import Design
 from sealag.design._jitter import loops_at
 from sealag.design._local import local_of
 from sealag.design._margins import stated
+from sealag.design._matrices import Matrices
 from sealag.errors import ContractionError, InputError
 from sealag.passivity import Criterion
 from sealag.whole_body import FrozenLoop
@@ -73,13 +74,17 @@ def rate_sweep(system: Design, rates: Sequence[float]) -> tuple[Rate, ...]:
             "A rate sweep takes one delay, and torque feedback is late too: leave out "
             "delays.delayed_torque_feedback."
         )
-    asked: set[float] = set(rates)
-    if system.delays.sample_time:
-        asked.add(round(1.0 / system.delays.sample_time, 6))
+    own = round(1.0 / system.delays.sample_time, 6)
+    ticked = system.program is not None and bool(loops[0].memory_period)
+    fixed = ticked and isinstance(system.program, Matrices)
+    # matrices of a period answer for that one only, programs tick at any
+    asked = {own} if fixed and rates is RATES else {own, *rates}
     found = []
     for rate in sorted(asked):
         period = 1.0 / rate
         way = replace(system.delays, sample_time=period).d_1 - period
+        if ticked and not fixed:
+            loops = [system.frozen(period=period)]
         margins = [loop.sampled_margin(period) for loop in loops]
         margin = min(margins, key=lambda one: one.proven if one.delay is None else one.delay)
         stable = True if way <= (margin.delay or margin.proven) else None

@@ -74,6 +74,7 @@ JointStiffness = Annotated[FiniteFloat, _within(0, 1e8, "Nm/rad")]
 TaskDamping = Annotated[FiniteFloat, _within(0, 1e6, "N s/m or Nm s/rad")]
 Duration = Annotated[FiniteFloat, _within(1e-6, 1e6, "s")]
 Instant = Annotated[FiniteFloat, _within(-1e12, 1e12, "s")]
+Entry = Annotated[FiniteFloat, _within(-1e12, 1e12)]
 Seed = Annotated[int, Field(ge=0)]
 
 
@@ -184,6 +185,21 @@ class ProgramKeys(Section):
     function: str = "controller"
 
 
+class MatrixKeys(Section):
+    """[controller] of kind "matrices": ẋ_c = A x_c + B y, δτ = C x_c + D y about the posture"""
+
+    kind: Literal["matrices"]
+    feedback: Annotated[str, _one_of((MotorAngles.name, LinkAngles.name))] = MotorAngles.name
+    time: Literal["continuous", "discrete"] = "continuous"
+    file: str | None = None
+    A: list[list[Entry]] | None = None
+    B: list[list[Entry]] | None = None
+    C: list[list[Entry]] | None = None
+    D: list[list[Entry]] | None = None
+    inputs: list[str] = []
+    outputs: list[str] = []
+
+
 def _kind_of(value: Any) -> str:
     """The kind of a [controller] table: the paper's law if none is named."""
     return str(value.get("kind", "wbosc")) if isinstance(value, dict) else "wbosc"
@@ -192,6 +208,7 @@ def _kind_of(value: Any) -> str:
 ControllerKeys = Annotated[
     Annotated[WholeBodyKeys, Tag("wbosc")]
     | Annotated[JointPdKeys, Tag("joint_pd")]
+    | Annotated[MatrixKeys, Tag("matrices")]
     | Annotated[ProgramKeys, Tag("python")],
     Discriminator(_kind_of),
 ]

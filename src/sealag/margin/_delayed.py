@@ -27,6 +27,10 @@ class DelayedLoop:
         embedded_delay: that delay e, s.
         symmetries: (n, s) columns v with A_0 v = A_1 v = A_e v = 0; they and the chains A_0 y = v,
             A_1 y = A_e y = 0 that belong to them are divided out before anything is computed.
+        memory: how many of the last states are a controller's, which moves them at its ticks.
+        memory_period: T, s, where these states are the bilinear equivalent of a controller that is
+            given for this period; 0 where it is given in continuous time, and at its ticks moves
+            them exactly with its measurement held.
     """
 
     A_0: ArrayLike
@@ -35,6 +39,8 @@ class DelayedLoop:
     A_e: ArrayLike | None = None
     embedded_delay: float = 0.0
     symmetries: ArrayLike | None = None
+    memory: int = 0
+    memory_period: float = 0.0
 
     @property
     def A_1(self) -> Array:
@@ -125,17 +131,35 @@ class DelayedLoop:
 
         A hold is a delay that grows from d to d + T and falls back: up to the jitter margin less T
         the loop is stable for sure. From there delays are tried, eight in a period, until one is
-        unstable, and the last step is bisected.
+        unstable, and the last step is bisected. The measurement of a controller with memory is held
+        too: the jitter margin is then that beside what drives the memory, late by up to T. Of one
+        that is given for its period nothing is proven.
 
         Args:
             period: T, s.
 
         Raises:
-            InputError: matrices do not fit, the period is no time, or there is an A_e.
+            InputError: matrices do not fit, the period is no time or not the memory's, or there is
+                an A_e.
             SolverError: a matrix moves a symmetry, or rounding leaves the jitter margin open.
         """
-        parts = self._parts()
-        return _held(*parts, period=period).margin(jitter_margin(*parts).delay)
+        held = self._held(period)
+        if not self.memory:
+            return held.margin(self.jitter_margin().delay)
+        if self.memory_period:
+            return held.margin(0.0)
+        A_0 = self._present()
+        driven, plant = np.zeros_like(A_0), len(A_0) - self.memory
+        driven[plant:, :plant] = A_0[plant:, :plant]
+        late = DelayedLoop(
+            A_0=A_0 - driven,
+            B=self.B,
+            C=self.C,
+            A_e=driven,
+            embedded_delay=period,
+            symmetries=self.symmetries,
+        )
+        return held.margin(late.jitter_margin().delay)
 
     def sampled_radius(self, period: float, delay: float) -> float:
         """Spectral radius of ẋ = A_0 x + B u with u = C x(kT) held on kT + d ≤ t < (k + 1) T + d.
@@ -146,18 +170,21 @@ class DelayedLoop:
             Γ_new = ∫_0^{T−r} e^{A_0 s} ds B ,   Γ_old = e^{A_0 (T−r)} ∫_0^r e^{A_0 s} ds B
 
         on x_k and the m + 1 commands that wait. The sampled loop is stable if and only if it is
-        less than 1.
+        less than 1. Memory ξ̇ = A_c ξ + G x is not part of that motion: it goes on at the ticks,
+
+            ξ_{k+1} = e^{A_c T} ξ_k + ∫_0^T e^{A_c s} ds G x_k   or, of a period of its own,
+            ξ_{k+1} = A_d ξ_k + (A_d + 1) G x_k ,  A_d = (1 + A_c T/2) (1 − A_c T/2)⁻¹ .
 
         Args:
             period: T, s.
             delay: d of measurement, computation and command together, s; the hold comes on top.
 
         Raises:
-            InputError: matrices do not fit, a time is no time, there is an A_e, or more commands
-                wait than can be lifted.
+            InputError: matrices do not fit, a time is no time or not the memory's period, there is
+                an A_e, or more commands wait than can be lifted.
             SolverError: a matrix moves a symmetry.
         """
-        return _held(*self._parts(), period=period).radius(time_of("delay", delay))
+        return self._held(period).radius(time_of("delay", delay))
 
     def roots(self, delay: float, *, count: int = 1, nodes: int = 24) -> Array:
         """Rightmost roots of det(λ − A_0 − A_1 e^{-λd} − A_e e^{-λe}) = 0.
@@ -248,6 +275,27 @@ class DelayedLoop:
         loop = self._prepared()
         return loop, Broken.of(loop, *self._sides())
 
+    def _held(self, period: float) -> Held:
+        """The loop whose command is held for a period."""
+        loop, broken = self._parts()
+        if loop.embedded:
+            raise InputError("A sampled loop has one delay; there is an A_e with one of its own.")
+        if not self.memory:
+            return Held.of(loop.A_0 + loop.A_e, broken.left, broken.right, period=period)
+        return Held.with_memory(
+            self._present(),
+            *self._sides(),
+            symmetries=self.symmetries,
+            memory=self.memory,
+            own=self.memory_period,
+            period=period,
+        )
+
+    def _present(self) -> Array:
+        """A_0 with an A_e that is not late."""
+        A_0 = real_square("A_0", self.A_0)
+        return A_0 if self.A_e is None or self.embedded_delay else A_0 + np.asarray(self.A_e)
+
 
 def _rows_of(matrix: Array) -> tuple[Array, Array]:
     """Columns of the identity and the rows that are not 0, whose product is the matrix."""
@@ -257,10 +305,3 @@ def _rows_of(matrix: Array) -> tuple[Array, Array]:
 
 def _numbered(letter: str, count: int) -> list[str]:
     return [f"{letter}[{k}]" for k in range(count)]
-
-
-def _held(loop: Loop, broken: Broken, *, period: float) -> Held:
-    """A loop whose command is held for a period."""
-    if loop.embedded:
-        raise InputError("A sampled loop has one delay; there is an A_e with one of its own.")
-    return Held.of(loop.A_0 + loop.A_e, broken.left, broken.right, period=period)

@@ -7,8 +7,9 @@ from typing import Self
 import numpy as np
 
 from sealag.errors import InputError
-from sealag.margin._loop import time_of
-from sealag.typing import Array
+from sealag.margin._loop import prepare, time_of
+from sealag.typing import Array, ArrayLike
+from sealag.units import in_ms
 
 _LARGEST = 500
 """States and waiting commands of one lifted loop. Its eigenvalues take a fifth of a second; ten
@@ -43,11 +44,15 @@ class SampledMargin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
-    """A loop without symmetries, ẋ = A x + left u, and what is sampled of it, right x."""
+    """A loop without symmetries, ẋ = A x + left u, sampled as u_k = right x_k + says ξ_k, and the
+    controller's own memory, ξ_{k+1} = keeps ξ_k + reads x_k."""
 
     A: Array
     left: Array
     right: Array
+    keeps: Array
+    reads: Array
+    says: Array
     period: float
 
     @classmethod
@@ -60,10 +65,64 @@ class Held:
             right: (r, n) the signals.
             period: T, s.
         """
-        T = time_of("period", period)
-        if T == 0.0:
-            raise InputError("period is 0 s; a positive time is needed.")
-        return cls(A=A, left=left, right=right, period=T)
+        return cls(
+            A=A, left=left, right=right, keeps=np.zeros((0, 0)), reads=np.zeros((0, len(A))),
+            says=np.zeros((len(right), 0)), period=_positive(period),
+        )  # fmt: skip
+
+    @classmethod
+    def with_memory(
+        cls,
+        A_0: Array,
+        B: Array,
+        C: Array,
+        *,
+        symmetries: ArrayLike | None,
+        memory: int,
+        own: float,
+        period: float,
+    ) -> Self:
+        """Split a controller's memory off, which goes on at the ticks.
+
+        Args:
+            A_0: (n, n) undelayed part, the memory's states last.
+            B: (n, m) what a command does.
+            C: (m, n) the command.
+            symmetries: (n, s) or None.
+            memory: number of the controller's states.
+            own: period that these are the bilinear equivalent for, s; 0 for none.
+            period: T, s.
+
+        Raises:
+            InputError: the memory acts past the command, or is of another period.
+            SolverError: a matrix moves a symmetry.
+        """
+        T, rest = _positive(period), len(A_0) - memory
+        A, A_c, G = A_0[:rest, :rest], A_0[rest:, rest:], A_0[rest:, :rest]
+        if A_0[:rest, rest:].any() or B[rest:].any():
+            raise InputError("The last states are a controller's memory, but act past its command.")
+        right, says, one = C[:, :rest], C[:, rest:], np.eye(memory)
+        if not own:
+            keeps, gain = _integrated(A_c, one, T)
+        elif math.isclose(own, T, rel_tol=1e-9):
+            keeps = np.linalg.solve(one - A_c * T / 2.0, one + A_c * T / 2.0)
+            gain = keeps + one
+            says = (T / 4.0) * says @ gain
+            right = right + says @ G
+        else:
+            raise InputError(
+                f"The controller is given for a period of {in_ms(own)}, and {in_ms(T)} is asked "
+                "for; its matrices say nothing of other rates."
+            )
+        # Gᵀ G has the null space of G: what memory does not see
+        plant = prepare(
+            A, B[:rest] @ right, A_e=G.T @ G, embedded_delay=1.0,
+            symmetries=None if symmetries is None else np.asarray(symmetries)[:rest],
+        )  # fmt: skip
+        return cls(
+            A=plant.A_0, left=np.linalg.pinv(plant.lift) @ B[:rest], right=right @ plant.lift,
+            keeps=keeps, reads=gain @ G @ plant.lift, says=says, period=T,
+        )  # fmt: skip
 
     def margin(self, varying: float) -> SampledMargin:
         """Find the largest delay beside the hold.
@@ -92,14 +151,15 @@ class Held:
 
     def size(self, delay: float) -> int:
         """States and waiting commands."""
-        return len(self.A) + (math.floor(delay / self.period) + 1) * len(self.right)
+        kept = len(self.A) + len(self.keeps)
+        return kept + (math.floor(delay / self.period) + 1) * len(self.right)
 
     def stable(self, delay: float) -> bool:
         return self.radius(delay) < 1.0 - _AT
 
     def radius(self, delay: float) -> float:
-        n, r, T = len(self.A), len(self.right), self.period
-        if not n:
+        n, s, r, T = len(self.A), len(self.keeps), len(self.right), self.period
+        if not n + s:
             return 0.0
         size, waiting = self.size(delay), math.floor(delay / T)
         if size > _LARGEST:
@@ -108,26 +168,36 @@ class Held:
                 f"of {T:g} s: more than can be lifted. Give a longer period."
             )
         rest = delay - waiting * T
-        move, new = self._integrated(T - rest)
-        early, old = self._integrated(rest)
-        lifted = np.zeros((size, size))
+        move, new = _integrated(self.A, self.left, T - rest)
+        early, old = _integrated(self.A, self.left, rest)
+        lifted, kept = np.zeros((size, size)), n + s
         lifted[:n, :n] = move @ early
+        lifted[n:kept, :kept] = np.hstack([self.reads, self.keeps])
+        command = np.hstack([self.right, self.says])
         arrives = [(waiting, new), (waiting + 1, move @ old)]
         for late, gain in arrives:
             if late == 0:
-                lifted[:n, :n] += gain @ self.right
+                lifted[:n, :kept] += gain @ command
             else:
-                lifted[:n, n + (late - 1) * r : n + late * r] = gain
-        lifted[n : n + r, :n] = self.right
-        lifted[n + r :, n:-r] = np.eye(size - n - r)
+                lifted[:n, kept + (late - 1) * r : kept + late * r] = gain
+        lifted[kept : kept + r, :kept] = command
+        lifted[kept + r :, kept:-r] = np.eye(size - kept - r)
         return float(np.abs(np.linalg.eigvals(lifted)).max())
 
-    def _integrated(self, time: float) -> tuple[Array, Array]:
-        """e^{A t} and ∫_0^t e^{A s} ds left."""
-        from scipy.linalg import expm
 
-        n, r = self.left.shape
-        both = np.zeros((n + r, n + r))
-        both[:n, :n], both[:n, n:] = self.A, self.left
-        whole = expm(both * time)
-        return whole[:n, :n], whole[:n, n:]
+def _positive(period: float) -> float:
+    T = time_of("period", period)
+    if T == 0.0:
+        raise InputError("period is 0 s; a positive time is needed.")
+    return T
+
+
+def _integrated(A: Array, left: Array, time: float) -> tuple[Array, Array]:
+    """e^{A t} and ∫_0^t e^{A s} ds left."""
+    from scipy.linalg import expm
+
+    n, r = left.shape
+    both = np.zeros((n + r, n + r))
+    both[:n, :n], both[:n, n:] = A, left
+    whole = expm(both * time)
+    return whole[:n, :n], whole[:n, n:]

@@ -1,7 +1,7 @@
 """Any controller, frozen: what ticks is differentiated about a state at rest."""
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,10 +10,10 @@ from sealag.errors import InputError
 from sealag.robot import Contact, Robot
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body._frozen import FrozenLoop
+from sealag.whole_body._linear import LinearLaw
 from sealag.whole_body._links import LinkPlant, null_space
 from sealag.whole_body._protocol import Measurement, TickController
 from sealag.whole_body._rest import Rest
-from sealag.whole_body._signal_states import LawDerivative
 
 _STEP = 1e-4
 """rad: half the base of central differences, extrapolated with those of half the base; rates are
@@ -21,10 +21,18 @@ moved by ten times as much, torques by K times. Ten times less leaves 1e-8 of th
 rounding; ten times more the bend of the law."""
 
 _SETTLED = 1e-11  # of the command: a smaller change from tick to tick is none
-_TICKS = 200  # to settle, at most
+_TICKS = 2000  # to settle, at most
+_ROUNDS = 200  # of motor angles that follow the command
+
 _REMEMBERS = 1e-2
-"""Share of the answer to a measurement that may come after the first tick. One Newton step a tick
-towards q̄(θ) leaves 1e-3 of it; a filter leaves most."""
+"""Share of the answer to one kind of measurement that may come after the first tick and count as
+none. One Newton step a tick towards q̄(θ) leaves 1e-3 of it; a filter leaves most."""
+
+_FELT = 1e-6  # share of the largest command: kinds of measurement that move it less count as unused
+
+_UNEXPLAINED = 1e-3
+"""Share of the answers from tick to tick that a linear memory may leave unexplained. Filters leave
+1e-7; an answer that bends leaves more than that ten times larger."""
 
 _BALANCED = 1e-6
 """Share of weight and torques that may be left over. A controller that drifts by more does not hold
@@ -41,13 +49,17 @@ class FrozenController:
         loop: ẋ = A_0 x + B C x(t − d) + A_e x(t − e); C is the derivative of what ticks.
         rest: the state.
         bend: share of C that differs at half the difference's base: 0 for a linear law.
-        memory: share of the answer to a measurement that comes after the first tick.
+        memory: share of the answer to a measurement that comes after the first tick, of the kind of
+            which most comes late: angles or rates of links or motors, or spring torques.
+        unexplained: share of the answers from tick to tick that the loop's memory leaves open; of a
+            controller without memory the same as `memory`, of stated matrices 0.
     """
 
     loop: FrozenLoop
     rest: Rest
     bend: float
     memory: float
+    unexplained: float
 
 
 def freeze(
@@ -63,11 +75,16 @@ def freeze(
 ) -> FrozenController:
     """Differentiate a controller that ticks, and close the loop about a state that it holds.
 
-    δτ_osc = C_q δq + C_v δv + C_θ δθ + C_θ̇ δθ̇ + C_τ δτ_sea by central differences of `tick`, each
-    after the controller has settled at rest. With δτ_sea = K (δθ − δq_j) + D_s (δθ̇ − δq̇_j) and the
-    links, motors and drives of `FrozenLoop` that is a loop with one delay, for `margin` and
-    `jitter_margin`. Any law that is a function of the newest measurement: joint PD, a policy,
-    gravity compensation, a predictor that does not remember.
+    The answer to a step of each measured quantity is a central difference of `tick`, after the
+    controller has settled at rest. What comes at once is
+
+        δτ_osc = C_q δq + C_v δv + C_θ δθ + C_θ̇ δθ̇ + C_τ δτ_sea ;
+
+    what comes later, of filters and estimators, is realised by as many states as it needs (Ho and
+    Kalman), which become states of the loop: their bilinear equivalent for this period, exact for
+    `sampled_margin` with it. With δτ_sea = K (δθ − δq_j) + D_s (δθ̇ − δq̇_j) and the links, motors
+    and drives of `FrozenLoop` that is a loop with one delay, for `margin` and `jitter_margin`. A
+    controller that states its matrices, see `TickController`, is not differentiated.
 
     Args:
         controller: whatever has `reset` and `tick`. It is ticked some thousand times, and reset.
@@ -83,60 +100,74 @@ def freeze(
         The loop.
 
     Raises:
-        InputError: shapes do not fit, the controller does not hold the state, never settles, or
-            remembers: then its answer is no function of one measurement.
+        InputError: shapes do not fit, the controller does not hold the state, never settles, as one
+            that integrates, or remembers what no linear memory explains.
     """
     posture = np.asarray(q, dtype=float)
     if posture.shape != (robot.nq,) or not np.isfinite(posture).all():
         raise InputError(f"q must be {robot.nq} finite numbers, got shape {posture.shape}.")
+    stated: Any = getattr(controller, "linear", None)
+    if stated is not None and theta is None:
+        theta = getattr(controller, "theta", None)
     ticked = _Ticked(controller, robot, actuators, contacts=len(contacts), period=period)
     rest = ticked.rest(posture, theta)
     _require_balance(robot, contacts, rest, ticked.command(rest))
-    wide, narrow = (ticked.slopes(rest, step) for step in (_STEP, _STEP / 2.0))
-    slopes = narrow.extrapolated(wide)
-    if slopes.memory > _REMEMBERS:
-        raise InputError(
-            f"The controller remembers: {slopes.memory:.0%} of its answer to a measurement comes "
-            "after the first tick, so that no matrix of the newest measurement stands for it. "
-            "Freeze it without its filters or estimators."
-        )
-    K, base = np.diag(actuators.spring_stiffness), robot.nv_base
-    C_q, C_v = slopes.q.copy(), slopes.v.copy()
-    C_q[:, base:] -= slopes.torque @ K
-    C_v[:, base:] -= slopes.torque * actuators.spring_damping
+    found = ticked.linear(rest) if stated is None else _stated(stated, robot)
     loop = FrozenLoop.with_derivative(
         robot,
-        replace(
-            LawDerivative.memoryless(C_q, slopes.theta + slopes.torque @ K),
-            C_v=C_v,
-            C_rate=slopes.theta_dot + slopes.torque * actuators.spring_damping,
-        ),
+        found.law.of_springs(actuators).derivative(),
         actuators,
         contacts=contacts,
         rest=rest,
         embedded_delay=embedded_delay,
     )
-    return FrozenController(loop=loop, rest=rest, bend=narrow.change(wide), memory=slopes.memory)
+    return FrozenController(
+        loop=loop, rest=rest, bend=found.bend, memory=found.memory, unexplained=found.unexplained
+    )
 
 
-class _Slopes(NamedTuple):
-    """Derivatives of the command by what is measured, and the largest share that comes late."""
+class _Found(NamedTuple):
+    """A law, and how far it may be believed."""
 
-    q: Array  # (n, nv)
-    v: Array  # (n, nv)
-    theta: Array  # (n, n)
-    theta_dot: Array  # (n, n)
-    torque: Array  # (n, n)
+    law: LinearLaw
+    bend: float
+    memory: float
+    unexplained: float
+
+
+def _stated(own: Any, robot: Robot) -> _Found:
+    """The matrices that a controller states, of all that can be measured."""
+    n, nv = robot.n, robot.nv
+    at = slice(nv - n, nv) if own.of_links else slice(2 * nv, 2 * nv + n)
+    gap = nv if own.of_links else n
+    places = np.concatenate([np.arange(at.start, at.stop), np.arange(at.start, at.stop) + gap])
+    spread = np.zeros((2 * n, 2 * nv + 3 * n))
+    spread[np.arange(2 * n), places] = 1.0
+    law = LinearLaw(A=own.A, B=own.B @ spread, C=own.C, D=own.D @ spread, period=own.period or 0.0)
+    return _Found(law, 0.0, float(len(own.A) > 0), 0.0)
+
+
+class _Answers(NamedTuple):
+    """Commands (N, n, m) from the first tick after a unit step of each measured quantity until they
+    stay, and the largest share that comes late."""
+
+    steps: Array
     memory: float
 
-    def extrapolated(self, wide: "_Slopes") -> "_Slopes":
+    def extrapolated(self, wide: "_Answers") -> "_Answers":
         """Return the limit of these differences and those of twice their base."""
-        parts = [(4.0 * mine - other) / 3.0 for mine, other in zip(self[:-1], wide[:-1])]
-        return _Slopes(*parts, memory=max(self.memory, wide.memory))
+        mine, other = _as_long(self.steps, wide.steps)
+        return _Answers((4.0 * mine - other) / 3.0, max(self.memory, wide.memory))
 
-    def change(self, other: "_Slopes") -> float:
-        mine, theirs = np.hstack(self[:-1]), np.hstack(other[:-1])
+    def change(self, other: "_Answers") -> float:
+        mine, theirs = _as_long(self.steps, other.steps)
         return float(np.linalg.norm(mine - theirs) / max(np.linalg.norm(mine), 1e-300))
+
+
+def _as_long(*answers: Array) -> list[Array]:
+    """Answers of one length; the settled command goes on."""
+    most = max(len(one) for one in answers)
+    return [np.concatenate([one, np.repeat(one[-1:], most - len(one), axis=0)]) for one in answers]
 
 
 class _Ticked:
@@ -180,14 +211,14 @@ class _Ticked:
             raise InputError("The controller's command at rest is not finite.")
         return out
 
-    def _settle(self) -> Array:
-        """Tick until the command stays."""
-        last = self._tick()
+    def _settle(self) -> list[Array]:
+        """Tick until the command stays, and return all of them."""
+        commands = [self._tick()]
         for _ in range(_TICKS):
-            command = self._tick()
+            commands.append(self._tick())
+            last, command = commands[-2:]
             if np.abs(command - last).max() <= _SETTLED * (1.0 + np.abs(command).max()):
-                return command
-            last = command
+                return commands
         raise InputError(
             f"The controller's command does not settle within {_TICKS} ticks of one measurement: "
             "it moves by itself, or integrates."
@@ -197,7 +228,7 @@ class _Ticked:
         """Return the settled command (n,) at a state."""
         self._see(rest.q, rest.theta)
         self._reset()
-        return self._settle()
+        return self._settle()[-1]
 
     def rest(self, q: Array, theta: ArrayLike | None) -> Rest:
         """Return the state; motor angles follow the command if none are given."""
@@ -205,47 +236,61 @@ class _Ticked:
         found = joints.copy() if theta is None else np.asarray(theta, dtype=float)
         if found.shape != joints.shape or not np.isfinite(found).all():
             raise InputError(f"theta must be {len(joints)} finite numbers, got {found.shape}.")
-        for _ in range(_TICKS if theta is None else 0):
+        for _ in range(_ROUNDS if theta is None else 0):
             self._see(q, found)
             self._reset()
-            found, last = joints + self._settle() / self._K, found
+            found, last = joints + self._settle()[-1] / self._K, found
             if np.abs(found - last).max() <= 1e-14 or np.abs(found).max() > _LONGEST:
                 break
         return Rest(
             q=q, theta=found, tau_sea=self._K * (found - joints), found=True, moved=0.0, reason=""
         )
 
-    def slopes(self, rest: Rest, step: float) -> _Slopes:
-        """Differentiate by all that is measured."""
-        robot, seen = self._robot, self._measured
-        late, size = 0.0, 0.0
+    def linear(self, rest: Rest) -> _Found:
+        """Differentiate by all that is measured, and realise what comes late."""
+        wide, narrow = (self._answers(rest, step) for step in (_STEP, _STEP / 2.0))
+        found, bend = narrow.extrapolated(wide), narrow.change(wide)
+        if found.memory <= _REMEMBERS:
+            return _Found(LinearLaw.static(found.steps[-1]), bend, found.memory, found.memory)
+        law, left = LinearLaw.realised(found.steps, period=self._period)
+        if left > _UNEXPLAINED:
+            raise InputError(
+                f"The controller remembers: {found.memory:.0%} of its answer to a measurement "
+                f"comes after the first tick, and {left:.1%} of it is what no linear memory does. "
+                "Freeze it without what switches or saturates there."
+            )
+        return _Found(law, bend, found.memory, left)
 
-        def slope(place: Array, base: float, *, tangent: bool = False) -> Array:
-            """The derivative by one part of the measurement, (n, its motions)."""
-            nonlocal late, size
-            columns = []
+    def _answers(self, rest: Rest, step: float) -> _Answers:
+        robot, seen = self._robot, self._measured
+        answers: list[Array] = []
+        late, size = [], []  # of each kind
+
+        def add(place: Array, base: float, *, tangent: bool = False) -> None:
+            """The answers to one part of the measurement."""
+            late.append(0.0)
+            size.append(0.0)
             for way in np.eye(robot.nv if tangent else place.size):
-                settled = []
+                both = []
                 for sign in (base, -base):
                     before = self.command(rest)
                     place[:] = (
                         robot.integrate(rest.q, sign * way) if tangent else place + sign * way
                     )
-                    first = self._tick() - before
-                    settled.append(self._settle() - before)
-                    late = max(late, float(np.abs(settled[-1] - first).max()))
-                    size = max(size, *(float(np.abs(one).max()) for one in (first, settled[-1])))
-                columns.append((settled[0] - settled[1]) / (2.0 * base))
-            return np.array(columns).T
+                    both.append(np.array(self._settle()) - before)
+                    late[-1] = max(late[-1], float(np.abs(both[-1] - both[-1][0]).max()))
+                    size[-1] = max(size[-1], float(np.abs(both[-1]).max()))
+                plus, minus = _as_long(*both)
+                answers.append((plus - minus) / (2.0 * base))
 
-        return _Slopes(
-            q=slope(seen.q, step, tangent=True),
-            v=slope(seen.v, 10.0 * step),
-            theta=slope(seen.theta, step),
-            theta_dot=slope(seen.theta_dot, 10.0 * step),
-            torque=slope(seen.tau_sea, step * float(self._K.max())),
-            memory=late / size if size else 0.0,
-        )
+        add(seen.q, step, tangent=True)
+        add(seen.v, 10.0 * step)
+        add(seen.theta, step)
+        add(seen.theta_dot, 10.0 * step)
+        add(seen.tau_sea, step * float(self._K.max()))
+        steps = np.stack(_as_long(*answers), axis=-1)
+        felt = [one > _FELT * max(size) for one in size]
+        return _Answers(steps, max((a / b for a, b, f in zip(late, size, felt) if f), default=0.0))
 
 
 def _require_balance(

@@ -8,25 +8,20 @@ import numpy as np
 from sealag.actuation import Actuators
 from sealag.margin import DelayedLoop, DelayMargin
 from sealag.robot import Contact, Robot
-from sealag.typing import Array
+from sealag.typing import Array, BoolArray
 from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._law import Law
-from sealag.whole_body._links import FreeLinks, LinkPlant, norm, null_space
+from sealag.whole_body._links import FreeLinks, LinkPlant
+from sealag.whole_body._reduced import Memory, without_momentum, without_noise
 from sealag.whole_body._rest import Rest
 from sealag.whole_body._signal_states import LawDerivative
-
-_FELT = 1e-6
-"""Share of the law's stiffness from which it counts as feeling a motion of the whole robot. Central
-differences leave 1e-9 where it feels none; a task that feels one feels it with its whole gain."""
-
-_KNOWN = 1e-9
-"""Share of the law's and the links' stiffness that central differences leave open: a motion that is
-held by less is held by nothing."""
-
 
 _DRIFT = 1e-9
 """1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
 _MOST_DRIFTING = 8  # zero roots that are counted
+_WEIGHTS = (0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
+"""Sizes of what memory takes in against the command, of which the best proves most. Three times as
+many prove a percent more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,31 +67,12 @@ class _Places:
         out[:, part] = values
         return out
 
-    def names(self, joints: tuple[str, ...], drives: Array) -> tuple[str, ...]:
+    def names(self, joints: tuple[str, ...], drives: Array, *, held: bool) -> tuple[str, ...]:
         angles = [f"z{i}" for i in range(self.k)] + [f"theta:{joint}" for joint in joints]
         rates = [f"d/dt {name}" for name in angles]
         torques = [f"drive:{joints[i]}" for i in drives]
-        return (*angles, *rates, *torques, *(f"tank:{i}" for i in range(self.memory_size)))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Memory:
-    """Memory ξ of a law, in coordinates z of the links: ξ̇ = A ξ + B_z z + B_theta θ + B_rate θ̇, and
-    C ξ of the command.
-
-    Attributes:
-        A: (s, s) 1/s.
-        B_z: (s, k).
-        B_theta: (s, n).
-        B_rate: (s, n).
-        C: (n, s).
-    """
-
-    A: Array
-    B_z: Array
-    B_theta: Array
-    B_rate: Array
-    C: Array
+        memory = "memory" if held else "tank"
+        return (*angles, *rates, *torques, *(f"{memory}:{i}" for i in range(self.memory_size)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +92,7 @@ class FrozenLoop(DelayedLoop):
         symmetries: (N, s) states along which nothing acts, because gravity, contacts and the law do
             not change: yaw about a point foot, translation of a free robot, unless a task feels it.
         bend: share of the law's derivative that changes within the distance asked for, `beside`.
+        memory, memory_period: as in `DelayedLoop`; the tank's x̂ is not counted there.
     """
 
     # what a loop may leave out, a frozen one always has: by keyword, without a default
@@ -150,21 +127,64 @@ class FrozenLoop(DelayedLoop):
         return self.states
 
     def channels(self) -> dict[str, float]:
-        """Return the exact margin, s, if one channel of the command is late and the other is not.
+        """Return the exact margin, s, if one kind of measurement is late and the other is not.
 
-        The channels are "positions" and "rates": angles and what the law remembers, and what it
-        takes from velocities.
+        They are "positions" and "rates": angles and torques, and velocities. What memory that a
+        controller moves at its ticks takes in is late with what it measures; the tank's x̂ is late
+        with the positions.
 
         Raises:
             SolverError: a margin is not known.
         """
         rates = np.array([name.startswith("d/dt ") for name in self.states])
-        found = {}
-        for name, columns in (("positions", ~rates), ("rates", rates)):
-            late = np.where(columns, self.C, 0.0)
-            alone = replace(self, A_0=self.A_0 + self.B @ (self.C - late), C=late)
-            found[name] = float(alone.margin().delay)
-        return found
+        kinds = {"positions": ~rates, "rates": rates}
+        return {
+            name: float(self.late_measurement(columns).margin().delay)
+            for name, columns in kinds.items()
+        }
+
+    def jitter_ways(self) -> dict[str, float]:
+        """Return the jitter margin, s, of each way while the other's delay is constant.
+
+        The signal passes both ways and the controller in between. Delays that vary do not commute
+        with its memory: a "command" that varies shifts what it says, C x(t − τ), a "measurement"
+        that varies shifts what it takes in. Without memory both are the jitter margin. The
+        command's part and the memory's of a measurement are weighted against each other, as a
+        multiplier X may; the best weight that was tried counts.
+
+        Raises:
+            SolverError: rounding leaves a norm open.
+        """
+        command = self.jitter_margin().delay
+        if not self.memory:
+            return {"command": command, "measurement": command}
+        measured = [
+            self.late_measurement(np.ones(len(self.states), dtype=bool), weight=weight)
+            for weight in _WEIGHTS
+        ]
+        return {
+            "command": command,
+            "measurement": max(loop.jitter_margin().delay for loop in measured),
+        }
+
+    def late_measurement(self, columns: BoolArray, *, weight: float = 1.0) -> "FrozenLoop":
+        """Return the loop of which only some measured states are late, on their way up.
+
+        Args:
+            columns: (N,) which states; those of `memory` are the controller's own and never late.
+            weight: of what memory takes in against the command, in size; it moves no root.
+        """
+        plant = len(self.states) - self.memory
+        takes = self.A_0[plant:].copy()
+        takes[:, plant:] = 0.0
+        C = self.C.copy()
+        C[:, plant:] = 0.0
+        size = float(np.linalg.norm(takes))
+        scale = weight * (float(np.linalg.norm(C)) or 1.0) / size if size else 1.0
+        B = np.hstack([self.B, np.eye(len(self.states))[:, plant:] / scale])
+        C = np.where(columns, np.vstack([C, scale * takes]), 0.0)
+        A_0 = self.A_0 + self.B @ self.C - B @ C
+        return replace(self, A_0=A_0, B=B, C=C, memory=0, memory_period=0.0)
 
     @classmethod
     def of(
@@ -249,12 +269,19 @@ class FrozenLoop(DelayedLoop):
             The frozen loop.
         """
         links = cls.free_links(robot, rest.q, rest.tau_sea, contacts=contacts)
-        links, kept, C_z, B_z = _without_momentum(links, command)
+        links, kept, C_z, B_z = without_momentum(links, command)
         memory = Memory(
-            A=command.A, B_z=B_z, B_theta=command.B_theta, B_rate=command.B_rate, C=command.C
+            A=command.A,
+            B_z=B_z,
+            B_theta=command.B_theta,
+            B_z_rate=command.B_v @ links.Z,
+            B_rate=command.B_rate,
+            C=command.C,
+            period=command.period,
+            held=command.held,
         )
         S = links.Z[robot.nv_base :]
-        H, C_z, C_theta = _without_noise(
+        H, C_z, C_theta = without_noise(
             links.H, S, actuators.spring_stiffness, C_z=C_z, C_theta=command.C_theta, memory=memory
         )
         loop = cls.of_links(
@@ -331,18 +358,22 @@ class FrozenLoop(DelayedLoop):
             C[:, at.memory] = memory.C
             A_0[at.memory, at.memory], A_0[at.memory, at.z] = memory.A, memory.B_z
             A_0[at.memory, at.theta] = memory.B_theta
+            A_0[at.memory, at.z_rate] = memory.B_z_rate
             A_0[at.memory, at.theta_rate] = memory.B_rate
         late = embedded_delay is not None
         A_e = B @ (rows.shift[:, None] * spring) if late else np.zeros_like(A_0)
         kept = np.zeros((k, 0)) if symmetries is None else symmetries
+        held = memory is not None and memory.held
         return cls(
             A_0=A_0,
             B=B,
             C=C,
             A_e=A_e,
             embedded_delay=embedded_delay or 0.0,
-            states=at.names(actuators.joints, drives),
+            states=at.names(actuators.joints, drives, held=held),
             symmetries=at.take(at.z, kept.T).T,
+            memory=at.memory_size if held else 0,
+            memory_period=memory.period if held else 0.0,
         )
 
     @staticmethod
@@ -361,60 +392,6 @@ class FrozenLoop(DelayedLoop):
             contacts: which frames are held.
         """
         return LinkPlant(robot, contacts).free(q, springs)
-
-
-def _without_momentum(
-    links: FreeLinks, command: LawDerivative
-) -> tuple[FreeLinks, Array, Array, Array]:
-    """Split off rigid motions: those that the law does not feel are symmetries; of those that it
-    feels the conserved momentum is left out, z are motions without it, rᵀ M z = 0.
-
-    No delay moves the zero roots of what is conserved.
-
-    Returns:
-        Links, symmetries (k, s), and the command's and the memory's columns of z.
-    """
-    rigid, M = links.rigid, links.M
-    felt_by = np.vstack([command.C_q, command.B_q]) @ links.Z
-    size = max(norm(felt_by), norm(command.C_theta)) * _FELT / 1e-9
-    kept = rigid @ null_space(felt_by @ rigid, rigid.shape[1], size=size)
-    felt_by = felt_by @ (np.eye(len(M)) - kept @ np.linalg.pinv(kept))
-    felt = rigid @ null_space(kept.T @ M @ rigid, rigid.shape[1], size=norm(M))
-    Y = null_space(felt.T @ M, len(M), size=norm(M))
-    links = replace(links, Z=links.Z @ Y, M=Y.T @ M @ Y, H=Y.T @ links.H @ Y, rigid=Y.T @ rigid)
-    felt_by = felt_by @ Y
-    n = len(command.C_q)
-    return links, Y.T @ kept, felt_by[:n], felt_by[n:]
-
-
-def _without_noise(
-    H: Array, S: Array, K: Array, *, C_z: Array, C_theta: Array, memory: Memory
-) -> tuple[Array, Array, Array]:
-    """Leave nothing of the stiffness along motions that it holds by no more than differences err.
-
-    A joint whose gravity is compensated and that no task holds rests wherever it is. Its root is 0,
-    which rounding of the differences must not push to the left. H z = Sᵀ K (θ − S z) and
-    K (θ − S z) = C_z z + C_theta θ then hold exactly along it.
-
-    Returns:
-        H, C_z and C_theta.
-    """
-    k, springs = S.shape[1], np.diag(K)
-    settled = np.hstack([C_z, C_theta])
-    if len(memory.A):
-        settled = settled - memory.C @ np.linalg.solve(
-            memory.A, np.hstack([memory.B_z, memory.B_theta])
-        )
-    stretch = springs @ np.hstack([-S, np.eye(len(K))])
-    static = np.vstack([np.hstack([H, np.zeros_like(S.T)]) - S.T @ stretch, stretch - settled])
-    _, values, rows = np.linalg.svd(static)
-    loose = rows[values <= _KNOWN * (norm(H) + norm(settled))].T
-    left = static @ loose
-    command = left[k:] @ loose.T
-    z = np.linalg.pinv(loose[:k])
-    links = left[:k] @ z
-    links = links + links.T - z.T @ (loose[:k].T @ links)
-    return H - links, C_z + command[:, :k], C_theta + command[:, k:]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,30 +35,38 @@ class Present(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawDerivative:
-    """The law about a state at rest, with memory ξ: ξ̇ = A ξ + B_q δq + B_theta δθ + B_rate δθ̇ and
-    δτ_osc = C ξ + C_q δq + C_theta δθ + C_v δv + C_rate δθ̇.
+    """The law about a state at rest, with memory ξ.
+
+        ξ̇ = A ξ + B_q δq + B_theta δθ + B_v δv + B_rate δθ̇
+        δτ_osc = C ξ + C_q δq + C_theta δθ + C_v δv + C_rate δθ̇
 
     Attributes:
         A: (s, s) 1/s; s = 0 for a law without memory.
         B_q: (s, nv).
         B_theta: (s, n).
+        B_v: (s, nv).
         B_rate: (s, n).
         C: (n, s).
         C_q: (n, nv) along tangent motions, Nm/rad.
         C_theta: (n, n), Nm/rad.
         C_v: (n, nv) of tangent velocities, Nms/rad.
         C_rate: (n, n) of motor velocities, Nms/rad.
+        period: s, that the memory is the bilinear equivalent for; 0 if it is continuous.
+        held: whether it moves at the controller's ticks, with its measurement held in between.
     """
 
     A: Array
     B_q: Array
     B_theta: Array
+    B_v: Array
     B_rate: Array
     C: Array
     C_q: Array
     C_theta: Array
     C_v: Array
     C_rate: Array
+    period: float = 0.0
+    held: bool = False
 
     @classmethod
     def memoryless(cls, C_q: Array, C_theta: Array) -> "LawDerivative":
@@ -71,7 +79,8 @@ class LawDerivative:
         n, nv = C_q.shape
         none = np.zeros((0, n))
         return cls(
-            A=np.zeros((0, 0)), B_q=np.zeros((0, nv)), B_theta=none, B_rate=none, C=none.T,
+            A=np.zeros((0, 0)), B_q=np.zeros((0, nv)), B_theta=none, B_v=np.zeros((0, nv)),
+            B_rate=none, C=none.T,
             C_q=C_q, C_theta=C_theta, C_v=np.zeros((n, nv)), C_rate=np.zeros((n, n)),
         )  # fmt: skip
 
@@ -378,6 +387,7 @@ class TankState:
         T_q, T_theta = _differences(law, self._target, q, theta, width, rows=m)
         rate = self._tank.rate
         return LawDerivative(
-            A=-rate * np.eye(m), B_q=rate * T_q, B_theta=rate * T_theta, B_rate=J, C=C,
-            C_q=C_q, C_theta=C_theta, C_v=np.zeros_like(C_q), C_rate=np.zeros_like(C_theta),
+            A=-rate * np.eye(m), B_q=rate * T_q, B_theta=rate * T_theta, B_v=np.zeros_like(T_q),
+            B_rate=J, C=C, C_q=C_q, C_theta=C_theta, C_v=np.zeros_like(C_q),
+            C_rate=np.zeros_like(C_theta),
         )  # fmt: skip
