@@ -36,8 +36,10 @@ _HOME = {
     "SealagError": "sealag.errors",
 }
 
-_ROOMS = ("actuation", "delay", "design", "errors", "export", "margin", "passivity", "report",
-          "robot", "simulation", "walking", "whole_body")  # fmt: skip
+_ROOMS = (
+    "actuation", "delay", "design", "errors", "export", "margin", "passivity", "report", "robot",
+    "simulation", "tune", "walking", "whole_body",
+)  # fmt: skip
 
 __all__ = [
     "Actuators",

@@ -171,13 +171,13 @@ def test_margin_command(cli):
     assert answer["unstable_modes"] == 0
 
 
-@pytest.mark.parametrize("base", ["--fixed", "--floating"])
+@pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_starter_file_answers_once_filled(base, tmp_path, cli):
     """Held by its torso Hume is certified; on two point feet no posture of it is at rest."""
     from helpers.robots import urdf_path
 
     path = tmp_path / "mine.toml"
-    code, _, _ = cli("init", urdf_path("bundled:hume.urdf"), "--out", path, base)
+    code, _, _ = cli("init", urdf_path("bundled:hume.urdf"), "--out", path, "--base", base)
     assert code == 0
     code, _, err = cli("certify", path)
     assert code == 2
@@ -198,9 +198,9 @@ def test_starter_file_answers_once_filled(base, tmp_path, cli):
     code, out, err = cli("certify", path, "--json", "--out", tmp_path / "c.json")
     answer = json.loads(out)
     assert err == ""
-    assert code == (0 if base == "--fixed" else 1)
-    assert answer["stable"] is (base == "--fixed")
-    if base == "--floating":
+    assert code == (0 if base == "fixed" else 1)
+    assert answer["stable"] is (base == "fixed")
+    if base == "floating":
         assert "no equilibrium" in answer["reasons"][0]
     assert cli("verify", tmp_path / "c.json")[0] == 0
     code, _, err = cli("init", urdf_path("bundled:hume.urdf"), "--out", path)
@@ -212,7 +212,7 @@ def test_the_starter_s_units_and_names_are_told(tmp_path, cli):
     """Of a stiffness that multiplies no inertia, a jitter on two ways, postures and folders."""
     help_text = " ".join(cli("init", "--help")[1].split())
     for name in ("standing, half_sitting, homing, home, default or neutral", "bundled:hume.urdf",
-                 "--fixed", "folder is made if needed"):  # fmt: skip
+                 "--base", "folder is made if needed"):  # fmt: skip
         assert name in help_text
     path = tmp_path / "new" / "p.toml"
     assert cli("init", "bundled:hume.urdf", "--out", path)[0] == 0

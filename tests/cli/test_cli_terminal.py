@@ -75,7 +75,7 @@ def test_bytes_that_are_no_text_are_written_out_or_refused(tmp_path, cli):
     assert json.loads(text)["recording"] == f"{tmp_path}/b\\udcffd.mcap"
     urdf = strange.with_suffix(".urdf")
     urdf.write_bytes((CASE.parent / "one.urdf").read_bytes())
-    code, _, err = cli("init", urdf, "--fixed", "--out", tmp_path / "p.toml")
+    code, _, err = cli("init", urdf, "--base", "fixed", "--out", tmp_path / "p.toml")
     assert (code, err.count("\n")) == (2, 1)
     assert "no UTF-8" in err
     assert not (tmp_path / "p.toml").exists()

@@ -8,7 +8,7 @@ import json
 import pytest
 
 from corpus.find import robots
-from corpus.run import taken
+from corpus.run import Answer, contradictions, misspoken, taken
 from helpers.robots import urdf_path
 
 FOLDER = urdf_path("example-robot-data:ur_description/urdf/ur5_robot.urdf").parents[2]

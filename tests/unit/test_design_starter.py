@@ -49,7 +49,8 @@ def test_joints_and_feet_are_the_robot_s(urdf):
 
 
 def test_a_fixed_robot_has_no_base_and_no_feet():
-    data = tomllib.loads(starter_project(str(urdf_path("bundled:hume.urdf"))))
+    path = str(urdf_path("bundled:hume.urdf"))
+    data = tomllib.loads(starter_project(path, floating_base=False))
     assert data["robot"]["base"] == "fixed"
     assert "contacts" not in data
     assert "base_position" not in data["posture"]
@@ -70,12 +71,22 @@ def test_the_posture_is_the_maker_s_and_stands_on_the_ground(urdf, knee):
     assert robot.frame_placement(next(iter(ROBOTS[urdf])), straight)[1][2] < -0.02
 
 
-def test_without_a_named_posture_the_legs_are_left_to_the_user():
+def test_without_a_named_posture_hume_stands_on_bent_knees():
     path = urdf_path("bundled:hume.urdf")
-    assert load_robot(path, floating_base=True).reference_posture() is None
-    text = starter_project(path, floating_base=True)
-    assert text.count('"FILL: rad"') == 6
-    assert 'left_knee = "FILL: rad"' in text
+    text = starter_project(path)
+    posture = filled(text).posture
+    assert '"FILL: rad"' not in text
+    assert text.count('"FILL') == 7
+    assert posture.joints["left_knee"] > 0.5
+    assert posture.joints["right_knee"] > 0.5
+    robot = load_robot(path, floating_base=True)
+    q = robot.configuration(posture.joints, base_position=posture.base_position)
+    robot.require_within_limits(q)
+    left, right = (robot.frame_placement(foot, q)[1] for foot in ("left_foot", "right_foot"))
+    assert left[2] == pytest.approx(0.0, abs=2e-3)
+    assert right[2] == pytest.approx(0.0, abs=2e-3)
+    middle = (left + right)[:2] / 2.0
+    assert robot.center_of_mass(q)[:2] == pytest.approx(middle, abs=2e-3)
 
 
 def test_commented_keys_are_the_schema_s_with_its_defaults():

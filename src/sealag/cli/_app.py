@@ -100,18 +100,22 @@ def init(
             help="Project file to write; its folder is made if needed. Default: ROBOT.toml.",
         ),
     ] = None,
-    floating: Annotated[
-        bool, typer.Option("--floating/--fixed", help="Whether the base floats.")
-    ] = True,
+    base: Annotated[
+        str,
+        typer.Option(
+            "--base", help="floating, fixed, or auto: a robot with legs floats, another is fixed."
+        ),
+    ] = "auto",
 ) -> None:
-    """Write a commented project file with the robot's own joints in it.
+    """Write a commented project file with the robot's own joints and feet in it.
 
     The posture is a group state of an SRDF in the URDF's folder, or in a folder srdf there or
     beside it, whose name begins with standing, half_sitting, homing, home, default or neutral.
+    Without one a robot with legs stands with bent knees, its centre of mass between its feet.
     """
     from sealag.cli._commands import init_project
 
-    path = init_project(urdf, out, floating_base=floating)
+    path = init_project(urdf, out, base=base)
     show(f"Wrote {path}; replace each FILL in it, then run: sealag certify {path}")
 
 

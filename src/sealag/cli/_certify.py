@@ -1,5 +1,6 @@
 """`sealag certify`: the certificate, its sentence and its numbers."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from sealag import design
@@ -59,10 +60,11 @@ def certify_project(
                 system, along, criterion=criterion, time_varying=time_varying, proofs=count
             ).confirmed()
         certificate.write(draft)
+    warnings = system.warnings(along)
     if as_json:
-        show_json(certificate.summary())
+        show_json({**certificate.summary(), "warnings": warnings})
     else:
-        _show_certificate(certificate, path)
+        _show_certificate(certificate, path, warnings)
     enough = {Status.CERTIFIED, *([Status.PASSIVE_ONLY] if allow_unstable else [])}
     return 0 if certificate.answer.status in enough else 1
 
@@ -77,13 +79,15 @@ def _stability(answer: Answer) -> str:
     return "yes" if answer.stable else "no"
 
 
-def _show_certificate(certificate: Certificate, path: Path) -> None:
+def _show_certificate(certificate: Certificate, path: Path, warnings: Sequence[str]) -> None:
     question, answer = certificate.question, certificate.answer
     worst = answer.worst
     shares = sorted(worst.direction.items(), key=lambda item: -item[1])
     limiting = ", ".join(f"{name} {share:.0%}" for name, share in shares[:3] if share >= 0.01)
     verdict = answer.status.value.replace("_", " ")
     show(certificate.headline)
+    for warning in warnings:
+        show(f"warning: {warning}")
     rows = [
         ("verdict", f"{verdict} ({question.criterion} criterion)"),
         ("stable", _stability(answer)),

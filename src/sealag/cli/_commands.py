@@ -10,7 +10,7 @@ from typing import Any
 from sealag import design
 from sealag.cli._json import show_json
 from sealag.cli._terminal import show
-from sealag.errors import CertificateError, FileError, InputError
+from sealag.errors import CertificateError, FileError, InputError, either
 from sealag.files import check_output, opened, write_text
 from sealag.passivity import Certificate, Status
 from sealag.robot import Motion
@@ -32,9 +32,13 @@ _STATED = {
     Status.NOT_CERTIFIED: ": as it states, the design is not certified",
 }
 
+_BASES = {"auto": None, "floating": True, "fixed": False}
 
-def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
-    """Write a starter project; an existing file is not overwritten."""
+
+def init_project(urdf: str, out: Path | None, *, base: str) -> Path:
+    """Write a starter project and say what was decided; an existing file is not overwritten."""
+    if base not in _BASES:
+        raise InputError(f"--base is {base!r}; it must be {either(list(_BASES))}.")
     stem = Path(urdf.rsplit(":", 1)[-1]).stem
     path = out or Path(f"{stem}.toml")
     check_output(path)
@@ -43,8 +47,11 @@ def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     named = urdf
     if ":" not in urdf:
         named = os.path.relpath(Path(urdf).resolve(), path.resolve().parent)
-    text = design.starter_project(urdf, floating_base=floating_base, named=named)
+    said: list[str] = []
+    text = design.starter_project(urdf, floating_base=_BASES[base], named=named, tell=said.append)
     write_text(path, text, replace=False)
+    for sentence in said:
+        show(f"sealag: {sentence}", error=True)
     return path
 
 

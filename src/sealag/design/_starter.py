@@ -1,29 +1,76 @@
 """A commented project file for a robot, to be filled in."""
 
 import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from sealag.design._starter_text import OPTIONAL, REQUIRED
+from sealag.design._starter_text import OPTIONAL, REQUIRED, SOLES
 from sealag.errors import InputError
-from sealag.robot import Robot, load_robot
+from sealag.robot import Contact, Robot, load_robot
 from sealag.typing import Array
 
 
-def starter_project(
-    urdf: str | Path, *, floating_base: bool = False, named: str | None = None
-) -> str:
-    """Write a starter project file for a robot, with its own joints in it.
+class _Ground(NamedTuple):
+    """How a robot stands.
 
-    The posture is one that an SRDF beside the URDF names. Without one the joints are at 0 or in
-    the middle of their range, and those that carry feet are left to be filled in: on straight legs
-    nothing is stable.
+    Attributes:
+        floating: whether the base moves freely.
+        why: a clause.
+        legs: how many it has.
+        contacts: what touches the ground.
+        upright: (4,) quaternion of the base.
+        sole: half length and width of soles, m; None if no shape tells them.
+    """
+
+    floating: bool
+    why: str
+    legs: int = 0
+    contacts: tuple[Contact, ...] = ()
+    upright: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
+    sole: tuple[float, float] | None = None
+
+    @property
+    def frames(self) -> list[str]:
+        """Names of the contacts' frames."""
+        return [contact.frame for contact in self.contacts]
+
+
+class _Posture(NamedTuple):
+    """Where the joints are.
+
+    Attributes:
+        origin: where the positions come from.
+        joints: (n,) rad or m; NaN where they are left to be filled in.
+        outside: what a named posture has for joints outside their limits, rad or m.
+    """
+
+    origin: str
+    joints: Array
+    outside: Mapping[str, float] = MappingProxyType({})
+
+
+def starter_project(
+    urdf: str | Path,
+    *,
+    floating_base: bool | None = None,
+    named: str | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> str:
+    """Write a starter project file for a robot, with its own joints, feet and a posture in it.
+
+    A robot with legs has a floating base and stands on its feet: in the posture that an SRDF beside
+    the URDF names; without one with knees bent, feet level and the centre of mass between them. All
+    other joints are at 0 or in the middle of their range.
 
     Args:
         urdf: the robot, as `load_robot` takes it.
-        floating_base: whether the root link moves freely.
+        floating_base: whether the root link moves freely; as its legs say if None.
         named: how the file names the URDF; as `urdf` if None.
+        tell: called with a sentence for each thing that was decided, and why.
 
     Returns:
         TOML text that certifies once each FILL is replaced.
@@ -33,25 +80,59 @@ def starter_project(
         RobotError: it is not a usable robot.
         InputError: the path's bytes are no text.
     """
-    robot = load_robot(urdf, floating_base=floating_base, skip_unusable=True)
-    feet = _feet(robot) if floating_base else []
+    say = tell or (lambda _: None)
+    robot = load_robot(urdf, floating_base=floating_base is True, skip_unusable=True)
+    ground = _ground(robot, floating_base)
+    if ground.floating is not robot.floating_base:
+        robot = load_robot(urdf, floating_base=ground.floating, skip_unusable=True)
+    posture = _posture(robot, ground)
+    say(f"base: {'floating' if ground.floating else 'fixed'}, because {ground.why}")
+    say(f"posture: {posture.origin}{_moved(posture.outside)}")
     rotor = robot.rotor_inertia
     known = bool((rotor > 0.0).all())
     required = REQUIRED.format(
         name=_text(robot.name),
         urdf=_text((str(urdf) if named is None else named).replace("\\", "/")),
-        base="floating" if floating_base else "fixed",
+        base="floating" if ground.floating else "fixed",
+        why=_line(ground.why),
         actuated=_actuated(robot),
-        posture=_posture(robot, feet),
+        posture=_posture_lines(robot, ground, posture),
         rotor=f"{rotor.min():.6g}"
         if known
         else '"FILL: B reflected to the joint, kg m^2 (kg where the joint slides)"',
         joint=_key(robot.joints[0]),
-        contacts=_contacts(robot, feet) if floating_base else "",
+        contacts=_contacts(robot, ground) if ground.floating else "",
     )
+    feet = ground.frames
     frame = (feet or list(robot.link_names()))[-1]
     pair = ", ".join(_text(name) for name in (feet[:2] if len(feet) > 1 else ("left", "right")))
-    return required + OPTIONAL.format(frame=_text(frame), feet=pair)
+    return required + OPTIONAL.format(
+        frame=_text(frame),
+        feet=pair,
+        simulation="# [simulation]" if ground.sole is None else "[simulation]",
+        soles=_soles(ground.sole),
+    )
+
+
+def _ground(robot: Robot, floating: bool | None) -> _Ground:
+    """What a robot stands on, and whether its base is free, if that is not said."""
+    if floating is False:
+        return _Ground(False, "it was asked for")
+    feet = robot.feet()
+    if floating is None and not feet.legs:
+        return _Ground(False, f"{feet.reason} (--base floating if it stands or flies freely)")
+    sole = None
+    if feet.half_length is not None and feet.half_width is not None:
+        sole = feet.half_length, feet.half_width
+    why = feet.reason if floating is None else f"it was asked for; {feet.reason}"
+    return _Ground(True, why, feet.legs, feet.contacts, feet.upright, sole)
+
+
+def _moved(outside: Mapping[str, float]) -> str:
+    """A clause on joints that a named posture has outside their limits; empty if none."""
+    if not outside:
+        return ""
+    return f"; {', '.join(outside)} moved to the nearest limit"
 
 
 def _text(name: str) -> str:
@@ -86,78 +167,76 @@ def _line(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in kept)
 
 
-def _posture(robot: Robot, feet: list[str]) -> str:
-    """The section's lines: base, and joints with where their values come from."""
-    carrying, reference = np.zeros(robot.n, dtype=bool), robot.reference_posture()
+def _posture(robot: Robot, ground: _Ground) -> _Posture:
+    """The posture of an SRDF, one to stand in, or joints that need no choice."""
+    joints, reference = robot.relaxed_posture(), robot.reference_posture()
     if reference is not None:
-        origin = f"{_text(reference.name)} of {_text(reference.file.name)}; rad or m"
-        positions = np.array([reference.joints[name] for name in robot.joints])
-    else:
-        origin = "rad or m; those left out are 0"
-        positions = np.array([_middle(robot, k) for k in range(robot.n)])
-        if feet:
-            carrying = robot.carriers(feet)
-            origin += "; on straight legs nothing is stable: bend the knees"
-    values = [
-        '"FILL: rad"' if fill else f"{value:.4g}"
-        for value, fill in zip(positions, carrying, strict=True)
-    ]
-    outside = {} if reference is None else reference.outside
+        origin = f"{_text(reference.name)} of {_text(reference.file.name)}"
+        return _Posture(origin, joints, reference.outside)
+    if not ground.legs or not ground.floating:
+        return _Posture("0, or the middle of the range where it leaves 0 out", joints)
+    stance = robot.stance(ground.contacts, ground.upright) if len(ground.contacts) > 1 else None
+    if stance is not None:
+        origin = "knees bent, feet level, the centre of mass between them (inverse kinematics)"
+        return _Posture(origin, stance.joints)
+    free = robot.carriers(ground.frames) if ground.contacts else np.ones(robot.n, dtype=bool)
+    origin = "on straight legs nothing is stable: bend the knees"
+    return _Posture(origin, np.where(free, np.nan, joints))
+
+
+def _posture_lines(robot: Robot, ground: _Ground, posture: _Posture) -> str:
+    """The section's lines: base, and joints with where their values come from."""
+    # Rounding leaves -0 where there is a 0, and 1e-17 of noise.
+    rounded = np.round(posture.joints, 6) + 0.0
+    values = ['"FILL: rad"' if np.isnan(value) else f"{value:.4g}" for value in rounded]
     notes = [
-        f"  # {outside[name]:.4g} there, outside its limits" if name in outside else ""
+        f"  # {posture.outside[name]:.4g} there, outside its limits"
+        if name in posture.outside
+        else ""
         for name in robot.joints
     ]
     joints = [
         f"{_key(name)} = {value}{note}"
         for name, value, note in zip(robot.joints, values, notes, strict=True)
     ]
-    height = None if carrying.any() else _height(robot, feet, positions)
-    return "\n".join([*_base(robot, feet, height), f"[posture.joints]         # {origin}", *joints])
+    origin = f"rad or m; {_line(posture.origin)}"
+    return "\n".join([*_base(robot, ground, rounded), f"[posture.joints]  # {origin}", *joints])
 
 
-def _base(robot: Robot, feet: list[str], height: float | None) -> list[str]:
+def _base(robot: Robot, ground: _Ground, joints: Array) -> list[str]:
     if not robot.floating_base:
         return []
-    comment = "m" if not feet else "m; `sealag simulate` moves it until the feet touch the ground"
-    z = 1.0 if height is None else height
+    feet, height = ground.frames, 1.0
+    if feet and not np.isnan(joints).any():
+        q = robot.configuration(joints, base_quaternion=ground.upright)
+        height = -float(robot.link_heights(feet, q).min())
+    comment = "m; `sealag simulate` moves it until the feet touch the ground" if feet else "m"
+    turn = ", ".join(f"{part:.6g}" if part % 1.0 else f"{part:.1f}" for part in ground.upright)
     return [
-        f"base_position = [0.0, 0.0, {z:.4f}]  # {comment}",
-        "base_quaternion_xyzw = [0.0, 0.0, 0.0, 1.0]",
+        f"base_position = [0.0, 0.0, {height:.4f}]  # {comment}",
+        f"base_quaternion_xyzw = [{turn}]",
     ]
 
 
-def _height(robot: Robot, feet: list[str], positions: Array) -> float | None:
-    """Height of the base at which the lowest foot is on the ground, m; None without feet."""
-    if not feet:
-        return None
-    q = robot.configuration(positions)
-    return -float(robot.link_heights(feet, q).min())
-
-
-def _middle(robot: Robot, index: int) -> float:
-    """0 where the limits allow it, else the middle of the range."""
-    low, high = float(robot.position_lower[index]), float(robot.position_upper[index])
-    return 0.0 if low <= 0.0 <= high else (low + high) / 2.0
-
-
-def _feet(robot: Robot) -> list[str]:
-    """Links that are called feet, at most four; of those that move as one the lowest."""
-    words = ("foot", "sole", "toe")
-    names = [name for name in robot.link_names() if any(w in name.lower() for w in words)]
-    lowest: dict[int, tuple[float, str]] = {}
-    joints = robot.frame_mounts(names).joint.tolist()
-    heights = robot.link_heights(names, robot.neutral()).tolist()
-    for name, joint, height in zip(names, joints, heights, strict=True):
-        lowest[joint] = min(lowest.get(joint, (np.inf, name)), (height, name))
-    return [name for _, name in lowest.values()][:4]
-
-
-def _contacts(robot: Robot, feet: list[str]) -> str:
+def _contacts(robot: Robot, ground: _Ground) -> str:
     lines = ["", "# Frames that the ground holds: a point (3 forces) or a surface (6)."]
-    for name in feet:
-        lines += ["[[contacts]]", f"frame = {_text(name)}", 'kind = "point"']
-    if not feet:
+    for contact in ground.contacts:
+        lines += ["[[contacts]]", f"frame = {_text(contact.frame)}", f'kind = "{contact.kind}"']
+    if ground.legs and not ground.contacts:
+        lines += [f"# {_line(ground.why)}.", "[[contacts]]"]
+        lines += ['frame = "FILL: the link of a foot; one [[contacts]] for each"', 'kind = "point"']
+    elif not ground.contacts:
         frame = _text(robot.link_names()[-1])
-        lines.append("# No link is called a foot: without contacts the robot flies.")
+        lines.append("# No feet were found: without contacts the robot flies.")
         lines += ["# [[contacts]]", f"# frame = {frame}", '# kind = "point"']
     return "\n".join([*lines, ""])
+
+
+def _soles(half: tuple[float, float] | None) -> str:
+    if half is None:
+        return SOLES
+    length, width = half
+    return (
+        f"foot_half_length = {length:.4g}  # m along x of a sole's frame: half of its shape\n"
+        f"foot_half_width = {width:.4g}  # m along y"
+    )

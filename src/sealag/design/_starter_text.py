@@ -8,7 +8,7 @@ REQUIRED = """\
 
 [robot]
 urdf = {urdf}
-base = "{base}"          # "floating" or "fixed"
+base = "{base}"          # "floating" or "fixed": {why}
 actuated = [             # joints with an actuator; their mimics follow, the others are locked
 {actuated}
 ]
@@ -72,15 +72,14 @@ OPTIONAL = """\
 # file = "motion.csv"
 
 # How `sealag simulate` runs the design:
-# [simulation]
+{simulation}
 # scenario = "regulate"        # regulate | track | drop | balance | walk
 # duration_s = 2.0
 # physics_step_ms = 0.5        # as fine as the fastest spring needs, at most 1, if left out
 # log_period_ms = 20.0         # between two logged instants; the controller's period if left out
 # friction = 0.8               # of the ground
 # foot_radius = 0.0            # m
-# foot_half_length = 0.1       # m, of surfaces
-# foot_half_width = 0.06       # m, of surfaces
+{soles}
 # torsional_damping = 0.0      # Nms/rad, of a foot that turns on the ground
 # torsional_radius = 0.02      # m, of the pressure that such a foot can use; none if left out
 # drop_height = 0.03           # m, for drop
@@ -102,3 +101,7 @@ OPTIONAL = """\
 # [walking.gait]
 # apex_speed = 0.5             # m/s over the stance foot; the other keys are in bundled:hume
 """
+
+SOLES = """\
+# foot_half_length = 0.1       # m, of surfaces
+# foot_half_width = 0.06       # m, of surfaces"""

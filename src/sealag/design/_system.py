@@ -13,6 +13,7 @@ from sealag.design._local import Local, local_of
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_of_run, save_motion
 from sealag.design._rates import RATES, Rate, rate_sweep
+from sealag.design._standing import standing_warnings
 from sealag.errors import InputError, either
 from sealag.passivity import Bound, Criterion
 from sealag.robot import Motion
@@ -138,6 +139,15 @@ class System(Design):
             MotionError: the ending is none of the three.
         """
         save_motion(motion, self.robot, path)
+
+    def warnings(self, motion: Motion | None = None) -> tuple[str, ...]:
+        """Return what keeps a floating-base robot from standing as the design says: no contacts, a
+        foot above or below the others, a centre of mass outside the feet.
+
+        Args:
+            motion: what is certified; the posture if None.
+        """
+        return standing_warnings(self, motion)
 
     def local(
         self, bounds: Array, motion: Motion | None = None, *, rest: Rest | None = None

@@ -1,9 +1,13 @@
 """Postures that a robot's maker names: the group states of an SRDF beside the URDF."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
+
+import numpy as np
+
+from sealag.typing import Array
 
 _NAMES = ("standing", "half_sitting", "homing", "home", "default", "neutral")
 
@@ -61,6 +65,24 @@ def posture_beside(urdf: Path, joints: Collection[str]) -> ReferencePosture | No
                 known = {name: state.joints.get(name, 0.0) for name in joints}
                 return state._replace(joints=known)
     return None
+
+
+def relaxed_positions(
+    reference: ReferencePosture | None, joints: Sequence[str], lower: Array, upper: Array
+) -> Array:
+    """Return joint positions (n,) of a named posture; without one 0 within the limits, else the
+    middle of the range, rad or m.
+
+    Args:
+        reference: the named posture, if there is one.
+        joints: (n,) names.
+        lower: (n,) limits, -inf where there is none.
+        upper: (n,) limits, inf where there is none.
+    """
+    if reference is not None:
+        return np.array([reference.joints[name] for name in joints])
+    inside = (lower <= 0.0) & (upper >= 0.0)
+    return (np.where(inside, 0.0, lower) + np.where(inside, 0.0, upper)) / 2.0
 
 
 def _states(path: Path) -> Iterator[ReferencePosture]:

@@ -12,9 +12,11 @@ import pinocchio as pin
 from sealag.constants import GRAVITY
 from sealag.errors import InputError, UnknownNameError, near
 from sealag.robot._contact import Contact
+from sealag.robot._feet import Feet, find_feet
 from sealag.robot._limits import refuse_outside
 from sealag.robot._mimic import Coupling, Follower, couple
-from sealag.robot._reference import ReferencePosture, posture_beside
+from sealag.robot._reference import ReferencePosture, posture_beside, relaxed_positions
+from sealag.robot._stance import Stance, find_stance
 from sealag.robot._tree import frame_mounts, tree_of
 from sealag.robot._workspace import Workspace
 from sealag.typing import Array, ArrayLike, BoolArray
@@ -247,6 +249,31 @@ class Robot:
             for ends in (self.position_lower, self.position_upper)
         )
         return None if found is None else found.within(lower, upper)
+
+    def relaxed_posture(self) -> Array:
+        """Return joint positions (n,) that need no choice: those of `reference_posture`; without
+        one 0 where the limits allow it, else the middle of the range, rad or m."""
+        limits = self.position_lower, self.position_upper
+        return relaxed_positions(self.reference_posture(), self.joints, *limits)
+
+    def feet(self) -> Feet:
+        """Return the feet, found by where limbs end, by the links' shapes and by names."""
+        postures = (np.zeros(self.n), self.relaxed_posture())
+        at = [self._coupling.expand(self.configuration(joints)) for joints in postures]
+        return find_feet(self._model, self.urdf_path, at)
+
+    def stance(
+        self, contacts: Sequence[Contact], upright: Sequence[float] = (0.0, 0.0, 0.0, 1.0)
+    ) -> Stance | None:
+        """Return a posture to stand in: knees bent, feet level, the centre of mass between them;
+        None if inverse kinematics finds none.
+
+        Args:
+            contacts: one of each foot, at least two.
+            upright: (4,) quaternion x, y, z, w of the base.
+        """
+        limits = self.position_lower, self.position_upper, self.relaxed_posture()
+        return find_stance(self._model, self._coupling, contacts, upright, *limits)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Return the joints' part (…, n) of configurations.

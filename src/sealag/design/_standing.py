@@ -1,0 +1,79 @@
+"""Whether a design stands: what its contacts and its centre of mass say before any certificate."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sealag.design._design import Design
+from sealag.robot import ContactKind, Motion
+from sealag.typing import Array
+
+_APART = 0.01  # m: soles and toes of one posture differ by less, a lifted foot by more
+_OUTSIDE = 0.005  # m: what rounding and the radius of a foot explain
+_DIRECTIONS = 720  # in which the support is looked at: distances are right to 1e-5 of themselves
+_CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
+
+
+def standing_warnings(design: Design, motion: Motion | None) -> tuple[str, ...]:
+    """Return what keeps a floating-base robot from standing as its design says.
+
+    A certificate holds for the contacts that the design states, wherever they are; these sentences
+    say where that is not what a person would mean. Along a motion feet may stand on steps and the
+    centre of mass may be anywhere: only contacts that are missing altogether are told.
+
+    Args:
+        design: the robot, its contacts and its posture.
+        motion: what is certified instead of the posture, or None.
+    """
+    if not design.robot.floating_base:
+        return ()
+    sets = (design.contacts,) if motion is None else motion.contact_sets
+    if not any(sets):
+        return (
+            f"{design.robot.name} flies: its base is floating and nothing holds it to the ground, "
+            "so that all of this is about free fall; give [[contacts]], or base = \"fixed\" in "
+            "[robot] for a robot that is held",
+        )  # fmt: skip
+    return tuple(_of_posture(design)) if motion is None else ()
+
+
+def _of_posture(design: Design) -> Iterator[str]:
+    robot, q = design.robot, design.posture
+    placed = [robot.frame_placement(contact.frame, q) for contact in design.contacts]
+    heights = np.array([position[2] for _, position in placed])
+    level = np.sort(heights)[(len(heights) - 1) // 2]
+    for contact, over in zip(design.contacts, (heights - level).tolist(), strict=True):
+        if abs(over) > _APART:
+            where = "above" if over > 0.0 else "below"
+            yield (
+                f"contact {contact.frame} is {abs(over):.3f} m {where} the other feet, and held "
+                "there all the same; correct the posture, or leave it out of [[contacts]]"
+            )
+    com = robot.center_of_mass(q)
+    outside = _distance(com[:2], _support(design, placed))
+    if outside > _OUTSIDE:
+        yield (
+            f"the centre of mass is {outside:.3f} m outside the feet, at x = {com[0]:.3f} m and "
+            f"y = {com[1]:.3f} m: no robot that stands freely is in balance there; correct the "
+            "posture (`sealag init` computes one) or [[contacts]]"
+        )
+
+
+def _support(design: Design, placed: list[tuple[Array, Array]]) -> Array:
+    """Points (k, 2) whose hull the feet cover, m."""
+    setting, points = design.simulation, []
+    half = _CORNERS * [setting.foot_half_length, setting.foot_half_width]
+    for contact, (rotation, position) in zip(design.contacts, placed, strict=True):
+        if contact.kind is ContactKind.SURFACE:
+            points.append(position[:2] + half @ rotation[:2, :2].T)
+        else:
+            points.append(position[None, :2])
+    return np.concatenate(points)
+
+
+def _distance(point: Array, hull: Array) -> float:
+    """Distance (m) of a point from the convex hull of others; 0 or less inside: the largest over
+    all directions u of u · point − max u · hull."""
+    angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    u = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return float((u @ point - (u @ hull.T).max(axis=1)).max())
