@@ -19,9 +19,9 @@ weighs as 1 cm."""
 _FLAT = 1e-3
 """m: points whose spread across a line is less do not fix the base about it."""
 
-_APART = 0.05
+_APART = 0.01
 """m: contacts that move against each other by more do not hold. Encoders and soft soles leave some
-mm; a wrong stance pattern leaves a step."""
+mm; of a foot of four that is lifted, a quarter of its height is left."""
 
 _TURNED = np.pi / 4.0
 """rad of tilt against the posture from which the order of a quaternion is questioned."""
