@@ -69,7 +69,7 @@ def test_a_lifted_foot_does_not_count_while_it_is_lifted(anymal, tmp_path):
     frame = anymal.contacts[1].frame
     down = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     motion, _ = read(anymal, tmp_path / "m.npz", q, **{f"contact:{frame}": down})
-    np.testing.assert_allclose(motion.q[:-1, :3], q[:-1, :3], atol=1e-6)
+    np.testing.assert_allclose(motion.q[:, :3], q[:, :3], atol=1e-6)
     with pytest.raises(MotionError, match="contradict each other"):
         read(anymal, tmp_path / "m.npz", q)
 
