@@ -181,6 +181,8 @@ def test_joint_states_of_ros_are_read_by_name(held, tmp_path):
     assert told == []
     motion, _ = read(held, tmp_path / "m.npz", {**states, "velocity": 2.0 + 0.0 * position})
     assert (motion.v == 2.0).all()
+    with pytest.raises(MotionError, match="as a column and in name"):
+        read(held, tmp_path / "m.npz", {**states, joints[0]: position[:, 0]})
     with pytest.raises(MotionError, match="position has shape"):
         read(held, tmp_path / "m.npz", {**states, "position": position[:, 1:]})
 
@@ -217,6 +219,12 @@ def test_yaw_and_changes_of_sign_are_none_of_it(walk, tmp_path):
         back, told = with_orientation(system, motion, quaternions, tmp_path / "m.npz")
         assert len(back) == len(motion)
         assert told == []
+
+
+def test_an_order_without_a_quaternion_is_refused(held, tmp_path):
+    for order, word in (("wxyz", "leave --quaternion out"), ("zyxw", "xyzw or wxyz")):
+        with pytest.raises(InputError, match=word):
+            read(held, tmp_path / "m.npz", table(held), quaternion=order)
 
 
 def test_a_base_that_jumps_is_questioned(walk, tmp_path):

@@ -30,18 +30,26 @@ _JUMP = 1.0
 """rad between two rows: 100 rad/s in a log of 100 rows a second, which no base turns."""
 
 
+def check_order(order: str) -> None:
+    """Refuse an order of quaternions that is none.
+
+    Args:
+        order: xyzw or wxyz.
+
+    Raises:
+        InputError: it is neither.
+    """
+    if order not in ORDERS:
+        raise InputError(f"quaternion is {order!r}; it must be xyzw or wxyz.")
+
+
 def in_order(quaternions: Array, order: str) -> Array:
     """Return quaternions (N, 4) with w last.
 
     Args:
         quaternions: (N, 4) as the file has them.
         order: xyzw or wxyz.
-
-    Raises:
-        InputError: the order is neither.
     """
-    if order not in ORDERS:
-        raise InputError(f"quaternion is {order!r}; it must be xyzw or wxyz.")
     return quaternions if order == "xyzw" else np.roll(quaternions, -1, axis=1)
 
 

@@ -30,12 +30,13 @@ Choose = Callable[[Sequence[str]], Mapping[str, str]]
 """Which columns of a table are read, and what they are called then."""
 
 
-def read_table(path: Path, choose: Choose) -> dict[str, Array]:
+def read_table(path: Path, choose: Choose, tell: Callable[[str], None]) -> dict[str, Array]:
     """Read some columns of a file.
 
     Args:
         path: the file; its ending tells the format.
         choose: given the names of all columns, those that are read and their new names.
+        tell: called with a sentence if a recording was cut off.
 
     Returns:
         The columns by their new names, each (N,): whole numbers as they are, others as doubles.
@@ -47,7 +48,7 @@ def read_table(path: Path, choose: Choose) -> dict[str, Array]:
     """
     ending = path.suffix.lower()
     if ending == RECORDING:
-        columns = recorded_columns(_recorded(path))
+        columns = recorded_columns(_recorded(path, tell))
         return {new: columns[old] for old, new in choose(list(columns)).items()}
     if ending not in _READERS:
         raise MotionError(
@@ -71,7 +72,7 @@ def _column(values: Array, name: str, path: Path) -> Array:
         raise MotionError(
             f"{path}: the column {name} has type {values.dtype} and shape {values.shape}; one real "
             "number a row is needed."
-        )
+        ).at(path, name)
     return values.ravel() if values.dtype.kind in "iu" else values.astype(float, copy=False).ravel()
 
 
@@ -164,14 +165,14 @@ def _csv_rows(
             raise MotionError(
                 f"{path}: the column {names[at]} is {cells[at]!r} in row {row}; it must "
                 "be a number."
-            )
+            ).at(path, names[at])
         yield numbers
 
 
 _READERS = {".csv": _read_csv, ".npz": _read_npz, ".parquet": _read_parquet}
 
 
-def _recorded(path: Path) -> dict[str, dict[str, Array]]:
+def _recorded(path: Path, tell: Callable[[str], None]) -> dict[str, dict[str, Array]]:
     """Signals of a recording by topic and name, as far as all of them go, and its time."""
     recording = read_recording(path)
     found = {
@@ -182,6 +183,8 @@ def _recorded(path: Path) -> dict[str, dict[str, Array]]:
     if "/joint_states" not in found:
         raise FileError(f"{path} holds no joint states; no motion can be read from it.")
     rows = min(len(signal.time) for signal in found.values())
+    if not recording.complete:
+        tell(f"{path}: the recording was cut off; its first {rows} rows are read")
     signals = {
         topic: dict(zip(signal.names, signal.values[:rows].T, strict=True))
         for topic, signal in found.items()
