@@ -82,9 +82,10 @@ def _read_npz(file: BinaryIO, path: Path, choose: Choose) -> dict[str, Array]:
     file.seek(0)
     data = np.load(file, allow_pickle=False)
     states = _joint_states(data, path)
-    names = (
-        [name for name in data.files if name not in ("name", *_STATES)] if states else data.files
-    )
+    names = [name for name in data.files if not states or name not in ("name", *_STATES)]
+    twice = next((name for name in names if name in states), None)
+    if twice is not None:
+        raise MotionError(f"{path}: {twice} stands there as a column and in name; keep one.")
     chosen = choose([*names, *states])
     return {new: states[old] if old in states else data[old] for old, new in chosen.items()}
 
