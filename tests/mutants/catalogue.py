@@ -452,8 +452,8 @@ MUTANTS = [
          "return True", "a base that contacts leave free"),
     ),
     *_of(
-        "motion", "design/_motion_table.py",
-        ("stuck = values == _STICKING", "stuck = values != 0.0", "a slipping foot holds"),
+        "motion", "simulation/_run.py",
+        ("(values == _STICKING)", "(values != 0)", "a slipping foot holds"),
     ),
     *_of(
         "motion", "design/_motion_file.py",

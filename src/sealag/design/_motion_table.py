@@ -3,7 +3,6 @@
 import csv
 import io
 import itertools
-import re
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ import numpy as np
 from sealag.errors import FileError, MotionError, SealagError
 from sealag.files import opened
 from sealag.report import read_recording
+from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.units import number_of
 
@@ -23,9 +23,6 @@ VELOCITY = ":velocity"
 RECORDING = ".mcap"
 LARGEST_BYTES = 2_000_000_000
 _CSV_BLOCK = 10_000  # rows that are lists of Python numbers at a time
-_STICKING = 1.0
-"""How a recording says that a contact point neither slips nor is open."""
-
 Choose = Callable[[Sequence[str]], Mapping[str, str]]
 """Which columns of a table are read, and what they are called then."""
 
@@ -197,8 +194,6 @@ def _recorded(path: Path, tell: Callable[[str], None]) -> dict[str, dict[str, Ar
 def recorded_columns(signals: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
     """Return a run's signals as the columns of a motion.
 
-    A contact holds where all points of its frame stick: neither open nor slipping.
-
     Args:
         signals: by topic and name: /time, /joint_states with `<joint>:position` and
             `<joint>:velocity`, and as far as there are any /base and /contact as `Run.signals` has
@@ -209,17 +204,5 @@ def recorded_columns(signals: Mapping[str, Mapping[str, Array]]) -> dict[str, Ar
     for name, values in signals["/joint_states"].items():
         if not name.endswith(":effort"):
             columns[name.removesuffix(":position")] = values
-    modes = {
-        name.removesuffix("_mode"): values
-        for name, values in signals.get("/contact", {}).items()
-        if name.endswith("_mode")
-    }
-    for point, values in modes.items():
-        numbered = re.fullmatch(r"(.+)_\d+", point)
-        frame = numbered[1] if numbered and f"{numbered[1]}_0" in modes else point
-        stuck = values == _STICKING
-        before = columns.get(CONTACT + frame)
-        columns[CONTACT + frame] = (stuck if before is None else stuck & (before == 1.0)).astype(
-            float
-        )
-    return columns
+    held = Run.held(signals.get("/contact", {}))
+    return columns | {CONTACT + frame: values.astype(float) for frame, values in held.items()}
