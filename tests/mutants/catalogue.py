@@ -41,6 +41,7 @@ TESTS = {
               "tests/unit/test_design_starter.py tests/unit/test_design_drift.py "
               "tests/meta/test_no_silent_key.py tests/cli/test_cli_certify.py "
               "tests/cli/test_cli_bad_input.py tests/cli/test_cli_margin.py",
+    "motion": "tests/unit/test_motion_columns.py tests/unit/test_motion_base.py",
     "simulation": "tests/unit/test_simulation_scenario_settings.py "
                   "tests/unit/test_simulation_energy.py tests/unit/test_simulation_exchange.py "
                   "tests/unit/test_simulation_damping.py tests/unit/test_simulation_ground.py "
@@ -433,6 +434,30 @@ MUTANTS = [
         ("common=None if withdrawn else common", "common=common", "a bound that was withdrawn"),
         ("published=float(proven.delay.min()) if printed else", "published=np.inf if printed else",
          "what the paper says"),
+    ),
+    *_of(
+        "motion", "design/_motion_names.py",
+        ("if not step >= _SLOW_ROWS:", "if True:", "milliseconds taken for seconds, of no unit"),
+        ("return relative * scale", "return values.astype(float) * scale", "digits of a date"),
+        ("if twice:\n            theirs", "if False:\n            theirs", "two columns are one"),
+    ),
+    *_of(
+        "motion", "design/_base_pose.py",
+        ("if tilt > 2.0 * _TURNED or", "if False or", "a base that is turned over"),
+        ("len(turns) and turns.max() > _JUMP", "False", "a base that jumps"),
+        ("np.abs((quaternions[1:] * quaternions[:-1]).sum(1))",
+         "(quaternions[1:] * quaternions[:-1]).sum(1)", "the sign of a quaternion"),
+        ("if apart > _APART:", "if False:", "a lifted foot that holds"),
+        ("return bool(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1] > _FLAT)",
+         "return True", "a base that contacts leave free"),
+    ),
+    *_of(
+        "motion", "simulation/_run.py",
+        ("(values == _STICKING)", "(values != 0)", "a slipping foot holds"),
+    ),
+    *_of(
+        "motion", "design/_motion_file.py",
+        ("unsaid=not recorded", "unsaid=True", "a foot of which a recording says nothing holds"),
     ),
     *_of(
         "design", "design/_local.py",

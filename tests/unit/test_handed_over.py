@@ -39,7 +39,7 @@ def test_a_run_is_a_table_with_the_recordings_names(walked, tmp_path):
             table[f"{joint}:velocity"], states.column(f"{joint}:velocity")
         )
     np.testing.assert_array_equal(table["base_qw"], run.q[:, 6])
-    assert table.shape[1] == 2 * len(run.joints) + sum(
+    assert table.shape[1] == 2 * len(run.joints) + len(set(run.feet)) + sum(
         len(signal.names)
         for topic, signal in recording.signals.items()
         if topic not in ("/joint_states", "/tf")
@@ -91,6 +91,18 @@ def test_a_state_space_closes_to_the_loop(name):
     loop = LOOPS[name]
     for s in (0.3 + 2.0j, 1.0 - 5.0j, 4.0 + 0.5j):
         assert closed(loop, s, 0.1) == pytest.approx(response(loop, s, 0.1), rel=1e-9)
+
+
+@pytest.mark.parametrize(("share", "stable"), [(0.98, True), (1.02, False)])
+def test_a_pade_approximant_closes_at_the_margin(share, stable):
+    """Poles of python-control, with the delay approximated there, cross at the margin."""
+    control = pytest.importorskip("control")
+    loop = sealag.load(EXAMPLES / "hume_held.toml").frozen()
+    found = loop.to_control()
+    numerator, denominator = control.pade(share * loop.margin().delay, 6)
+    late = control.tf2ss(control.tf(numerator, denominator))
+    closed = control.feedback(found, control.append(*[late] * found.ninputs), sign=1)
+    assert (closed.poles().real.max() < 0.0) == stable
 
 
 def test_a_robots_loop_has_its_states_names():

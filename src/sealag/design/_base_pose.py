@@ -19,9 +19,9 @@ weighs as 1 cm."""
 _FLAT = 1e-3
 """m: points whose spread across a line is less do not fix the base about it."""
 
-_APART = 0.05
+_APART = 0.01
 """m: contacts that move against each other by more do not hold. Encoders and soft soles leave some
-mm; a wrong stance pattern leaves a step."""
+mm; of a foot of four that is lifted, a quarter of its height is left."""
 
 _TURNED = np.pi / 4.0
 """rad of tilt against the posture from which the order of a quaternion is questioned."""
@@ -30,18 +30,26 @@ _JUMP = 1.0
 """rad between two rows: 100 rad/s in a log of 100 rows a second, which no base turns."""
 
 
+def check_order(order: str) -> None:
+    """Refuse an order of quaternions that is none.
+
+    Args:
+        order: xyzw or wxyz.
+
+    Raises:
+        InputError: it is neither.
+    """
+    if order not in ORDERS:
+        raise InputError(f"quaternion is {order!r}; it must be xyzw or wxyz.")
+
+
 def in_order(quaternions: Array, order: str) -> Array:
     """Return quaternions (N, 4) with w last.
 
     Args:
         quaternions: (N, 4) as the file has them.
         order: xyzw or wxyz.
-
-    Raises:
-        InputError: the order is neither.
     """
-    if order not in ORDERS:
-        raise InputError(f"quaternion is {order!r}; it must be xyzw or wxyz.")
     return quaternions if order == "xyzw" else np.roll(quaternions, -1, axis=1)
 
 
@@ -97,8 +105,9 @@ def pose_from_contacts(
     """Fill in the base's pose so that contacts stay where they are.
 
     In each row the base is where the points of the contacts that hold it lie closest to where they
-    were set down, Σ |R p_i + p − P_i|² minimal (Kabsch). The first row's places are the posture's;
-    a contact that begins to hold is set down where it was in the row before.
+    were set down, Σ |R p_i + p − P_i|² minimal (Kabsch). The first row's places are the posture's.
+    A contact lands where those that stay put it, or, where they do not fix the base without it,
+    where it was in the row before.
 
     Args:
         q: (N, nq) with the joints; the base's part is written.
@@ -120,12 +129,19 @@ def pose_from_contacts(
         for row in range(rows.start, rows.stop):
             q[row, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
             points = [_points(robot, q[row], contact) for contact in contacts]
-            for k in np.flatnonzero(held[row] & ~before):
-                places[k] = stood[k]
-            holding = np.flatnonzero(held[row])
-            here = np.concatenate([np.zeros((0, 3)), *(points[k] for k in holding)])
-            there = np.concatenate([np.zeros((0, 3)), *(places[k] for k in holding)])
-            R, p = _fit(here, there, path=path, row=row)
+            staying, landing = held[row] & before, np.flatnonzero(held[row] & ~before)
+            if not _fixes(_chosen(points, staying)):  # they land where they were a row ago
+                staying = held[row]
+                for k in landing:
+                    places[k] = stood[k]
+            here, there = _chosen(points, staying), _chosen(places, staying)
+            if not _fixes(here):
+                raise MotionError(
+                    f"{path}: the columns base_x … base_qw are missing, and in row {row + 1} the "
+                    "contacts that hold do not fix the base: three points or a surface do. Give "
+                    "the base's pose."
+                ).at(path, "base_x")
+            R, p = _fit(here, there)
             q[row, :3], q[row, 3:7] = p, _quaternion(R)
             stood, before = [point @ R.T + p for point in points], held[row]
             if row == 0:  # another stance than the posture's is no slip
@@ -139,8 +155,22 @@ def pose_from_contacts(
                     "from where they stood: joints and contacts contradict each other. Give "
                     "contact:<frame> columns with 0 where a foot is lifted, or the base's pose."
                 )
+            for k in landing:
+                places[k] = stood[k]
         release(q)
     return largest
+
+
+def _chosen(points: Sequence[Array], which: Array) -> Array:
+    """Points of some contacts, one below the other."""
+    return np.concatenate([np.zeros((0, 3)), *(points[k] for k in np.flatnonzero(which))])
+
+
+def _fixes(points: Array) -> bool:
+    """Whether points fix a body: three or more that are not on one line."""
+    if len(points) < 3:
+        return False
+    return bool(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1] > _FLAT)
 
 
 def _points(robot: Robot, q: Array, contact: Contact) -> Array:
@@ -151,16 +181,9 @@ def _points(robot: Robot, q: Array, contact: Contact) -> Array:
     return np.concatenate([p[None], p + _FOOT * R.T])
 
 
-def _fit(here: Array, there: Array, *, path: Path, row: int) -> tuple[Array, Array]:
+def _fit(here: Array, there: Array) -> tuple[Array, Array]:
     """Rotation R and shift p with R here + p closest to there."""
-    centre = here.mean(axis=0) if len(here) else np.zeros(3)
-    spread = np.linalg.svd(here - centre, compute_uv=False) if len(here) > 1 else np.zeros(2)
-    if len(here) < 3 or spread[1] < _FLAT:
-        raise MotionError(
-            f"{path}: the columns base_x … base_qw are missing, and in row {row + 1} the contacts "
-            "that hold do not fix the base: three points or a surface do. Give the base's pose."
-        ).at(path, "base_x")
-    target = there.mean(axis=0)
+    centre, target = here.mean(axis=0), there.mean(axis=0)
     U, _, V = np.linalg.svd((here - centre).T @ (there - target))
     turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(V.T @ U.T))])
     R = V.T @ turn @ U.T

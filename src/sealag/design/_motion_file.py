@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sealag.design._base_pose import in_order, pose_from_contacts, question
+from sealag.design._base_pose import check_order, in_order, pose_from_contacts, question
 from sealag.design._design import Design
 from sealag.design._motion_names import TIME, Names, mapping_of
 from sealag.design._motion_table import CONTACT, RECORDING, read_table, recorded_columns
@@ -46,7 +46,7 @@ def load_motion(
         tell=notes.append,
     )
     try:
-        table = read_table(path, names.choose)
+        table = read_table(path, names.choose, notes.append)
         time = next(iter(table))
         table = {TIME: names.seconds(time, table.pop(time)), **table}
         motion = _motion(
@@ -120,6 +120,10 @@ def _motion(
     """
     robot, contacts = system.robot, system.contacts
     _check_rows(table, path)
+    if quaternion is not None:
+        check_order(quaternion)
+        if "base_qx" not in table:
+            raise MotionError(f"{path} has no base_qx … base_qw; leave --quaternion out.")
     time = table[TIME]
     store = Store.of(
         len(time), robot.nq + robot.nv, what="A motion", remedy="give fewer of its rows"
@@ -177,7 +181,7 @@ def _check_rows(table: dict[str, Array], path: Path) -> None:
             row = int(bad.argmax())
             raise MotionError(
                 f"{path}: the column {name} is {column[row]:g} in row {row + 1}; it must be {need}."
-            )
+            ).at(path, name)
 
 
 def _unit(quaternions: Array, path: Path) -> Array:

@@ -242,8 +242,9 @@ class Names:
 
     def _asked(self, name: str, step: float) -> float:
         """The unit of a time whose name says none: s, if rows are as close as that."""
-        if step < _SLOW_ROWS:
-            self.tell(f"{self.path}: {name} is taken as seconds; its rows are {step:g} apart")
+        if not step >= _SLOW_ROWS:  # also a NaN, which its row is refused for
+            if step:
+                self.tell(f"{self.path}: {name} is taken as seconds; its rows are {step:g} apart")
             return 1.0
         raise MotionError(
             f"{self.path}: the column {name} does not say its unit, and its rows are {step:g} "

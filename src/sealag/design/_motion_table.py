@@ -3,7 +3,6 @@
 import csv
 import io
 import itertools
-import re
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ import numpy as np
 from sealag.errors import FileError, MotionError, SealagError
 from sealag.files import opened
 from sealag.report import read_recording
+from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.units import number_of
 
@@ -23,19 +23,17 @@ VELOCITY = ":velocity"
 RECORDING = ".mcap"
 LARGEST_BYTES = 2_000_000_000
 _CSV_BLOCK = 10_000  # rows that are lists of Python numbers at a time
-_STICKING = 1.0
-"""How a recording says that a contact point neither slips nor is open."""
-
 Choose = Callable[[Sequence[str]], Mapping[str, str]]
 """Which columns of a table are read, and what they are called then."""
 
 
-def read_table(path: Path, choose: Choose) -> dict[str, Array]:
+def read_table(path: Path, choose: Choose, tell: Callable[[str], None]) -> dict[str, Array]:
     """Read some columns of a file.
 
     Args:
         path: the file; its ending tells the format.
         choose: given the names of all columns, those that are read and their new names.
+        tell: called with a sentence if a recording was cut off.
 
     Returns:
         The columns by their new names, each (N,): whole numbers as they are, others as doubles.
@@ -47,7 +45,7 @@ def read_table(path: Path, choose: Choose) -> dict[str, Array]:
     """
     ending = path.suffix.lower()
     if ending == RECORDING:
-        columns = recorded_columns(_recorded(path))
+        columns = recorded_columns(_recorded(path, tell))
         return {new: columns[old] for old, new in choose(list(columns)).items()}
     if ending not in _READERS:
         raise MotionError(
@@ -71,7 +69,7 @@ def _column(values: Array, name: str, path: Path) -> Array:
         raise MotionError(
             f"{path}: the column {name} has type {values.dtype} and shape {values.shape}; one real "
             "number a row is needed."
-        )
+        ).at(path, name)
     return values.ravel() if values.dtype.kind in "iu" else values.astype(float, copy=False).ravel()
 
 
@@ -81,9 +79,10 @@ def _read_npz(file: BinaryIO, path: Path, choose: Choose) -> dict[str, Array]:
     file.seek(0)
     data = np.load(file, allow_pickle=False)
     states = _joint_states(data, path)
-    names = (
-        [name for name in data.files if name not in ("name", *_STATES)] if states else data.files
-    )
+    names = [name for name in data.files if not states or name not in ("name", *_STATES)]
+    twice = next((name for name in names if name in states), None)
+    if twice is not None:
+        raise MotionError(f"{path}: {twice} stands there as a column and in name; keep one.")
     chosen = choose([*names, *states])
     return {new: states[old] if old in states else data[old] for old, new in chosen.items()}
 
@@ -164,14 +163,14 @@ def _csv_rows(
             raise MotionError(
                 f"{path}: the column {names[at]} is {cells[at]!r} in row {row}; it must "
                 "be a number."
-            )
+            ).at(path, names[at])
         yield numbers
 
 
 _READERS = {".csv": _read_csv, ".npz": _read_npz, ".parquet": _read_parquet}
 
 
-def _recorded(path: Path) -> dict[str, dict[str, Array]]:
+def _recorded(path: Path, tell: Callable[[str], None]) -> dict[str, dict[str, Array]]:
     """Signals of a recording by topic and name, as far as all of them go, and its time."""
     recording = read_recording(path)
     found = {
@@ -182,6 +181,8 @@ def _recorded(path: Path) -> dict[str, dict[str, Array]]:
     if "/joint_states" not in found:
         raise FileError(f"{path} holds no joint states; no motion can be read from it.")
     rows = min(len(signal.time) for signal in found.values())
+    if not recording.complete:
+        tell(f"{path}: the recording was cut off; its first {rows} rows are read")
     signals = {
         topic: dict(zip(signal.names, signal.values[:rows].T, strict=True))
         for topic, signal in found.items()
@@ -193,8 +194,6 @@ def _recorded(path: Path) -> dict[str, dict[str, Array]]:
 def recorded_columns(signals: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
     """Return a run's signals as the columns of a motion.
 
-    A contact holds where all points of its frame stick: neither open nor slipping.
-
     Args:
         signals: by topic and name: /time, /joint_states with `<joint>:position` and
             `<joint>:velocity`, and as far as there are any /base and /contact as `Run.signals` has
@@ -205,17 +204,5 @@ def recorded_columns(signals: Mapping[str, Mapping[str, Array]]) -> dict[str, Ar
     for name, values in signals["/joint_states"].items():
         if not name.endswith(":effort"):
             columns[name.removesuffix(":position")] = values
-    modes = {
-        name.removesuffix("_mode"): values
-        for name, values in signals.get("/contact", {}).items()
-        if name.endswith("_mode")
-    }
-    for point, values in modes.items():
-        numbered = re.fullmatch(r"(.+)_\d+", point)
-        frame = numbered[1] if numbered and f"{numbered[1]}_0" in modes else point
-        stuck = values == _STICKING
-        before = columns.get(CONTACT + frame)
-        columns[CONTACT + frame] = (stuck if before is None else stuck & (before == 1.0)).astype(
-            float
-        )
-    return columns
+    held = Run.held(signals.get("/contact", {}))
+    return columns | {CONTACT + frame: values.astype(float) for frame, values in held.items()}

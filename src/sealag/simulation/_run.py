@@ -1,6 +1,7 @@
 """What a run leaves behind: arrays over its logged instants, its events and its end."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,9 @@ from sealag.simulation._outcome import Outcome
 from sealag.simulation._plant import ContactEvent
 from sealag.store import blocks, release
 from sealag.typing import Array, IntArray
+
+_STICKING = 1
+"""Mode of a contact point that neither slips nor is open."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,13 +149,35 @@ class Run:
     def _by_joint(self, values: Array, unit: str) -> dict[str, Array]:
         return {f"{joint}_{unit}": one for joint, one in zip(self.joints, values.T, strict=True)}
 
+    @staticmethod
+    def held(contact: Mapping[str, Array]) -> dict[str, Array]:
+        """Return whether each foot holds: all points of its frame stick, none is open or slips.
+
+        Args:
+            contact: The signals of the topic ``/contact``.
+
+        Returns:
+            By frame, (N,) truth values.
+        """
+        modes = {
+            name.removesuffix("_mode"): values
+            for name, values in contact.items()
+            if name.endswith("_mode")
+        }
+        found: dict[str, Array] = {}
+        for point, values in modes.items():
+            numbered = re.fullmatch(r"(.+)_\d+", point)
+            frame = numbered[1] if numbered and f"{numbered[1]}_0" in modes else point
+            found[frame] = found.get(frame, True) & (values == _STICKING)
+        return found
+
     def to_pandas(self) -> Any:
         """Return the run as a DataFrame of pandas, a row a logged instant.
 
         Configurations and velocities are named as in a motion file, ``base_x … base_qw``, the
-        joints, ``base_vx … base_wz`` and ``<joint>:velocity``, so that its CSV is one; the rest by
-        topic and name of the recording, such as ``torque/command/left_knee_nm``. All of it is read
-        into memory.
+        joints, ``base_vx … base_wz``, ``<joint>:velocity`` and ``contact:<frame>``, so that its CSV
+        is one; the rest by topic and name of the recording, such as
+        ``torque/command/left_knee_nm``. All of it is read into memory.
 
         Returns:
             The DataFrame; its index is ``time_s``.
@@ -166,6 +192,8 @@ class Run:
         columns |= dict(zip(self.joints, self.q.T[-n:], strict=True))
         rates = Motion.velocity_columns(self.joints, floating_base=False)
         columns |= dict(zip(rates, self.v.T[-n:], strict=True))
+        held = self.held(signals.get("/contact", {}))
+        columns |= {f"contact:{frame}": values.astype(float) for frame, values in held.items()}
         for topic, named in signals.items():
             columns |= {f"{topic[1:]}/{name}": values for name, values in named.items()}
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time_s"))
