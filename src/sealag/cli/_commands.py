@@ -36,7 +36,7 @@ _STATED = {
 
 def init_project(urdf: str, out: Path | None, *, floating_base: bool) -> Path:
     """Write a starter project; an existing file is not overwritten."""
-    stem = Path(urdf.rsplit(":", 1)[-1]).stem
+    stem = Path(urdf.rsplit(":", 1)[-1].removesuffix(".xacro")).stem
     path = out or Path(f"{stem}.toml")
     check_output(path)
     if path.exists():
