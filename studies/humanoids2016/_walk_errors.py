@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from sealag.actuation import Actuators
+from sealag.errors import RobotError
 from sealag.robot import Robot, load_robot
 from sealag.typing import Array
 from sealag.whole_body import Measurement, TickController
@@ -97,7 +98,12 @@ def wrong_robot(robot: Robot, *, error: float, seed: int) -> Robot:
         robot: The right one.
         error: Largest relative error; each number's is uniform in ±.
         seed: Of the errors.
+
+    Raises:
+        RobotError: The robot was not read from a file.
     """
+    if robot.urdf_path is None:
+        raise RobotError(f"{robot.name} is of no URDF, whose numbers could be changed.")
     rng = np.random.default_rng(seed)
     tree = ElementTree.parse(robot.urdf_path)
     for inertial in tree.iter("inertial"):

@@ -35,27 +35,43 @@ def main() -> int:
 
 
 def table(outcomes: Iterable[Outcome], folder: Path) -> Iterator[str]:
-    """Yield the lines of a Markdown table, after a count of the verdicts.
+    """Yield Markdown: what each folder's files gave, why files are refused, and each robot.
 
     Args:
         outcomes: of all robots.
         folder: where they are.
     """
     listed = list(outcomes)
-    counts = Counter(one.verdict or "finding" for one in listed)
-    yield f"{len(listed)} robots: " + ", ".join(f"{n} {word}" for word, n in counts.most_common())
-    yield ""
-    yield "| robot | joints | answer | s |"
-    yield "|---|---|---|---|"
+    counts: dict[str, Counter[str]] = {}
     for one in listed:
-        name = one.robot.relative_to(folder)
-        answer = _said(one).replace(str(one.robot.parent), "").replace("|", "\\|")
-        yield f"| {name} | {one.joints or ''} | {answer} | {one.seconds:.1f} |"
+        part = one.robot.relative_to(folder).parts[0]
+        counts.setdefault(part, Counter())[one.verdict or "finding"] += 1
+    yield from ("| folder | answers |", "|---|---|")
+    for part, found in counts.items():
+        yield f"| {part} | {', '.join(f'{n} {word}' for word, n in found.most_common())} |"
+    reasons = Counter(_said(one, name="it") for one in listed if one.refusal)
+    if reasons:
+        yield from ("", "| files | refused, and why |", "|---|---|")
+        yield from (f"| {count} | {_cell(why)} |" for why, count in reasons.most_common())
+    if any(one.verdict not in ("read", "refused") for one in listed):
+        yield from ("", "| robot | joints | answer | s |", "|---|---|---|---|")
+        for one in listed:
+            if one.joints:
+                name = one.robot.relative_to(folder)
+                yield f"| {name} | {one.joints} | {_cell(_said(one))} | {one.seconds:.1f} |"
 
 
-def _said(one: Outcome) -> str:
-    refusal = one.refusal.removeprefix("sealag: ").replace(f"{one.robot}", one.robot.name)
-    return ": ".join(filter(None, (one.verdict, refusal, "; ".join(one.findings))))
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def _said(one: Outcome, *, name: str = "") -> str:
+    file = name or one.robot.name
+    refusal = one.refusal.removeprefix("sealag: ")
+    for written in (str(one.robot), one.robot.name):
+        refusal = refusal.replace(written, file)
+    verdict = "" if one.verdict == "refused" and name else one.verdict
+    return ": ".join(filter(None, (verdict, refusal, "; ".join(one.findings))))
 
 
 if __name__ == "__main__":

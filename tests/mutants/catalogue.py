@@ -588,6 +588,17 @@ MUTANTS = [
         ("weak = (own < LEAST_INERTIA) |", "weak = (own < 0.0) |", "links without inertia"),
     ),
     *_of(
+        "robot", "robot/_urdf.py",
+        ("limit.set(\"lower\", upper)", "limit.set(\"lower\", lower)", "swapped limits"),
+    ),
+    *_of(
+        "robot", "robot/_mjcf.py",
+        ("R = R @ turn if letter.islower() else turn @ R", "R = R @ turn", "eulerseq"),
+        ("pos - centre)", "pos)", "places of several joints"),
+        ("inertia = frame.R @ own @ frame.R.T", "inertia = own", "turned inertia"),
+        ("at = _HERE  # where", "pass  # where", "place of a free body"),
+    ),
+    *_of(
         "robot", "robot/_workspace.py",
         ("return self._weight * self.terms.com_jacobian[2]",
          "return self._weight * self.terms.com_jacobian[1]", "direction of gravity"),

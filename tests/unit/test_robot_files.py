@@ -6,6 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
+import sealag
 from helpers.mimics import joint, link, robot
 from sealag.design import starter_project
 from sealag.errors import FileError, RobotError, UnknownNameError
@@ -86,6 +87,25 @@ def test_swapped_limits_are_exchanged_and_told(tmp_path):
     for word in ("joint j", "2 … -1", "-1 … 2"):
         assert word in remark
     assert f"# {remark}" in starter_project(tmp_path / "r.urdf")
+
+
+def test_a_certificate_says_what_was_read_otherwise(tmp_path):
+    swapped = PLAIN.replace('lower="-3.0" upper="3.0"', 'lower="2" upper="-1"', 1)
+    keys = []
+    for text in (PLAIN, swapped):
+        arm = read(tmp_path, text)
+        drives = sealag.Actuators.of_robot(
+            arm, spring_stiffness=300.0, rotor_inertia=0.1, inertia_shaping=0.5, motor_damping=20.0
+        )
+        law = sealag.Law(tasks=(sealag.Task(name="rest", kind="posture", stiffness=50.0),))
+        delays = sealag.Delays(central=sealag.Constant(0.002), embedded=sealag.Constant(0.001))
+        system = sealag.System(
+            robot=arm, actuators=drives, law=law, delays=delays, posture=arm.neutral()
+        )
+        assumptions = sealag.certify(system).answer.assumptions
+        keys.append({one.key: one.text for one in assumptions})
+    assert "urdf_reading" not in keys[0]
+    assert "limits of joint j" in keys[1]["urdf_reading"]
 
 
 FREE = robot(

@@ -89,8 +89,8 @@ def init(
     urdf: Annotated[
         str,
         typer.Argument(
-            help="The robot's URDF: a path, bundled:hume.urdf, or example-robot-data:PATH of that "
-            "package."
+            help="The robot's URDF, xacro or MJCF file: a path, bundled:hume.urdf, "
+            "package://PACKAGE/PATH, or example-robot-data:PATH of that package."
         ),
     ],
     out: Annotated[
@@ -108,6 +108,8 @@ def init(
     ] = "auto",
 ) -> None:
     """Write a commented project file with the robot's own joints and feet in it.
+
+    Joints that cannot have an actuator are behind a #, each with its reason.
 
     The posture is a group state of an SRDF in the URDF's folder, or in a folder srdf there or
     beside it, whose name begins with standing, half_sitting, homing, home, default or neutral.

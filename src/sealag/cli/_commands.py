@@ -39,7 +39,7 @@ def init_project(urdf: str, out: Path | None, *, base: str) -> Path:
     """Write a starter project and say what was decided; an existing file is not overwritten."""
     if base not in _BASES:
         raise InputError(f"--base is {base!r}; it must be {either(list(_BASES))}.")
-    stem = Path(urdf.rsplit(":", 1)[-1]).stem
+    stem = Path(urdf.rsplit(":", 1)[-1].removesuffix(".xacro")).stem
     path = out or Path(f"{stem}.toml")
     check_output(path)
     if path.exists():

@@ -10,7 +10,7 @@ import numpy as np
 from sealag.design._design import Design
 from sealag.robot import Motion
 from sealag.store import blocks, release
-from sealag.whole_body import Spaces
+from sealag.whole_body import Rest, Spaces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +34,11 @@ class Along:
             motion: its instants; the posture if None.
         """
         return cls(system=system, motion=system.still() if motion is None else motion)
+
+    @cached_property
+    def rest(self) -> Rest | None:
+        """Where the loop of a single instant rests; None for a motion."""
+        return self.system.rest(self.motion) if len(self.motion) == 1 else None
 
     @cached_property
     def _first(self) -> Spaces:

@@ -150,7 +150,7 @@ def certify(
     motion = system.motion_of(motion)
     kind = system.criterion_asked(motion, criterion, time_varying=time_varying, proofs=proofs)
     along = Along.of(system, motion)
-    rest = system.rest(motion) if len(motion) == 1 else None
+    rest = along.rest
     bounds = bounds_along(along, kind, rest=rest, published=True, solver=solver)
     printed = kind is Criterion.PUBLISHED
     bound, common, moving = bounds.bound, None, None

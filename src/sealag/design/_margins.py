@@ -99,9 +99,9 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
     system, motion = along.system, along.motion
     if system.program is not None:
         return _of_program(along, horizon)
-    bound = bounds_along(along, Criterion.CERTIFIED).bound
+    bound = bounds_along(along, Criterion.CERTIFIED, rest=along.rest).bound
     bounds = bound.delay
-    local = local_of(along, bounds)
+    local = local_of(along, bounds, along.rest)
     margin, loop, rest = local.margin, local.loop, local.rest
     if loop is None:
         raise ContractionError(local.problem)

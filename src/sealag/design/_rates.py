@@ -55,7 +55,8 @@ def _loops(system: Design) -> list[FrozenLoop]:
     if system.program is not None:
         return [system.frozen()]
     along = Along.of(system)
-    local = local_of(along, bounds_along(along, Criterion.CERTIFIED).bound.delay)
+    bounds = bounds_along(along, Criterion.CERTIFIED, rest=along.rest).bound.delay
+    local = local_of(along, bounds, along.rest)
     if local.loop is None:
         raise ContractionError(local.problem)
     return list(loops_at(along, 0, local))

@@ -24,8 +24,8 @@ WORLD = "world"
 _JOINTS = ("joint", "freejoint")
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "free": "floating", "ball": "planar"}
 """Joints of MuJoCo as those of a URDF; a ball, like a planar joint, can only be locked."""
-_MADE = ("attach", "composite", "flexcomp", "replicate")
-"""Elements that make bodies when MuJoCo compiles them."""
+_MADE = ("attach", "composite", "flex", "flexcomp", "replicate")
+"""Elements that make or bend bodies when MuJoCo compiles them."""
 _COMPILED = {
     "settotalmass": "-1", "balanceinertia": "false", "boundmass": "0", "boundinertia": "0",
     "inertiafromgeom": "auto false", "coordinate": "local",
@@ -96,6 +96,9 @@ class _Translation:
             gravity = self._vector(option, "gravity", 3, f"0 0 -{GRAVITY}")
             if not np.allclose(gravity, [0.0, 0.0, -GRAVITY]):
                 raise self._refuse(f"gravity is {_text(gravity)}; it must be 0 0 -{GRAVITY:g}")
+            for key in ("density", "viscosity"):
+                if self._number(option, key) != 0.0:
+                    raise self._refuse(f"the {key} of a fluid is not supported; remove it")
         for constraint in self.root.iterfind("equality/*"):
             if constraint.get("active") != "false":
                 raise self._refuse(
@@ -172,6 +175,8 @@ class _Translation:
         for key in ("stiffness", "ref"):
             if self._number(joint, key) != 0.0:
                 raise self._refuse(f"the {key} of joint {name} is not supported; remove it")
+        if "springdamper" in joint.attrib:
+            raise self._refuse(f"the springdamper of joint {name} is not supported; remove it")
         made = self._connect(name, _KINDS[kind], parent, child, at)
         if kind not in ("hinge", "slide"):
             return
@@ -190,10 +195,9 @@ class _Translation:
             limit.set("upper", "1e9")
         if joint.get("actuatorfrcrange") and joint.get("actuatorfrclimited") != "false":
             limit.set("effort", repr(float(self._vector(joint, "actuatorfrcrange", 2, "0 0")[1])))
-        SubElement(
-            made, "dynamics", damping=joint.get("damping", "0").split()[0],
-            friction=joint.get("frictionloss", "0"), armature=joint.get("armature", "0"),
-        )  # fmt: skip
+        said = {"damping": "damping", "friction": "frictionloss", "armature": "armature"}
+        values = {key: repr(self._number(joint, name)) for key, name in said.items()}
+        SubElement(made, "dynamics", values)
 
     def _inertial(self, body: Element, link: Element, childclass: str) -> None:
         given = body.find("inertial")
@@ -299,7 +303,8 @@ class _Translation:
         if len(values) != length or not np.isfinite(values).all():
             name = element.get("name", "")
             raise self._refuse(
-                f"{key} of {element.tag} {name} is {element.get(key)!r}; it needs {length} numbers"
+                f"{key} of <{element.tag}> {name!r} is {element.get(key)!r}; it must be "
+                f"{'a number' if length == 1 else f'{length} numbers'}"
             )
         return np.array(values)
 

@@ -9,6 +9,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from sealag.errors import RobotError
 from sealag.robot._find import find_package
@@ -63,7 +64,7 @@ def print_expanded(name: str) -> None:
         )
         sys.modules |= {index.__name__: index, packages.__name__: packages}
     try:
-        document = xacro.process_file(name)
+        document: Any = xacro.process_file(name)
     except Exception as error:
         sys.exit(" ".join(str(error).split()) or type(error).__name__)
     sys.stdout.buffer.write(document.documentElement.toxml("utf-8"))

@@ -179,7 +179,8 @@ class _Loop:
         found = root(lambda angles: answer(angles) - angles, first, tol=_AT_REST)
         if not (np.isfinite(found.x).all() and np.abs(found.fun).max() < 1e3 * _AT_REST):
             raise InputError(
-                "the springs have no rest under the controller's first command; give theta"
+                "the springs have no rest under the controller's first command: stiffen them, or "
+                "choose a posture with less load"
             )
         return answer(found.x)
 
