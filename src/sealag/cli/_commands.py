@@ -131,7 +131,8 @@ def margin_project(
     if found.not_passive:
         passive = f"none: {found.not_passive}"
     show(f"{'passive bound':26} {passive}")
-    show(f"{'jitter margin':26} {time_text(found.jitter_s):12} this robot, every delay below it")
+    varies = "one way varies, every delay below it" if found.memory else "every delay below it"
+    show(f"{'jitter margin':26} {time_text(found.jitter_s):12} this robot, {varies}")
     show(f"{'local margin':26} {time_text(found.delay_s):12} this robot, a constant delay: exact")
     for name, value in found.channels_s.items():
         show(f"{f'  only {name} late':26} {time_text(value)}")

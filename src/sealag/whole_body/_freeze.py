@@ -24,11 +24,13 @@ _SETTLED = 1e-11  # of the command: a smaller change from tick to tick is none
 _TICKS = 2000  # to settle, at most
 _ROUNDS = 200  # of motor angles that follow the command
 
-_REMEMBERS = 1e-2
+_REMEMBERS = 3e-2
 """Share of the answer to one kind of measurement that may come after the first tick and count as
-none. One Newton step a tick towards q̄(θ) leaves 1e-3 of it; a filter leaves most."""
+none. A base that follows the joints from tick to tick leaves 2e-2 of it; a filter leaves most."""
 
-_FELT = 1e-6  # share of the largest command: kinds of measurement that move it less count as unused
+_FELT = 1e-3
+"""Share of the largest command: kinds of measurement that move it less count as unused. A rate of
+1e-3 rad/s is set against an angle of 1e-4 rad, so that it is K_d < 1e-4 s K_p."""
 
 _UNEXPLAINED = 1e-3
 """Share of the answers from tick to tick that a linear memory may leave unexplained. Filters leave
