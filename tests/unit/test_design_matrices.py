@@ -90,15 +90,14 @@ def test_continuous_matrices_tick_as_their_exact_discretisation(tmp_path):
     margin = continuous.margin().delay
     short = continuous.sampled_margin(1e-4)
     assert 0.0 < short.proven <= short.delay
-    assert (
-        margin - 1e-4 < short.delay < margin - 0.4e-4
-    )  # the command's hold, and the measurement's
+    assert margin - 1e-4 < short.delay < margin - 0.4e-4  # both holds
     step = fine.controller()
     seen = Measurement.allocate(nq=7, nv=7, n=7)
     seen.theta[:], seen.theta_dot[:] = step.theta, 1.0
-    step.reset(0.0, seen)
     out = np.zeros(7)
-    for k in range(5):
+    for k in [*range(5), *range(5)]:
+        if k == 0:  # also in the middle: the past is forgotten
+            step.reset(0.0, seen)
         step.tick(1e-3 * k, seen, out)
         expected = -np.diag(KD) * (1.0 - np.exp(-CUT * 1e-3 * k))
         np.testing.assert_allclose(out - step.offset, expected, atol=1e-9)
@@ -114,7 +113,7 @@ def test_each_way_has_a_jitter_margin(tmp_path):
 
 
 def test_it_integrates(tmp_path):
-    """A weak integrator takes no margin, a strong one all of it; at rest it has no gain to invert."""
+    """A weak integrator takes no margin, a strong one all of it."""
     weak = {"A": O, "B": np.hstack([I, O]), "C": -0.5 * KP, "D": np.hstack([-KP, -KD])}
     found, without = arm(tmp_path, weak).local_margins(), arm(tmp_path, STATIC).local_margins()
     assert found.unstable_modes == 0
