@@ -4,7 +4,7 @@ import io
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from sealag.files import read_whole
 from sealag.robot import Robot
 from sealag.typing import Array
 from sealag.whole_body import LinkAngles, Measurement
-
-if TYPE_CHECKING:
-    from sealag.design._design import Design
 
 _LARGEST_BYTES = 50_000_000
 _NAMES = ("A", "B", "C", "D")
@@ -44,8 +41,8 @@ class Matrices:
     period: float
     of_links: bool
 
-    def __call__(self, system: "Design") -> "MatrixController":
-        """Return the controller that ticks about the system's posture."""
+    def __call__(self, system: Any) -> "MatrixController":
+        """Return the controller that ticks about the posture of a `System`."""
         return MatrixController(self, system)
 
 
@@ -55,7 +52,7 @@ class MatrixController:
     Matrices in continuous time move on exactly with y_k held for the clock's period.
     """
 
-    def __init__(self, matrices: Matrices, system: "Design") -> None:
+    def __init__(self, matrices: Matrices, system: Any) -> None:
         from scipy.linalg import expm
 
         rest = system.in_posture()
