@@ -35,6 +35,8 @@ class LocalMargins:
         channels_s: exact margin at the critical instant if only the position signals, or only the
             rates, of the command are late, s; empty if it feeds back no rates.
         memory: states of the controller in the loop, that it moves at its ticks; 0 for a law.
+        bend: share of a program's answers that changes at half the step: it is not linear by that
+            much; 0 for a law and for matrices.
         frequency_rad_s: frequency of that pair, rad/s; None without one.
         mode: share of each joint's motor in that pair's motion.
         unstable_modes: roots with positive real part without delay, at that instant.
@@ -56,6 +58,7 @@ class LocalMargins:
     jitter_s: float | None
     channels_s: Mapping[str, float]
     memory: int
+    bend: float
     frequency_rad_s: float | None
     mode: Mapping[str, float]
     unstable_modes: int
@@ -119,6 +122,7 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         jitter_s=jitter_along(along, bounds, local),
         channels_s=loop.channels() if system.law.damped else {},
         memory=loop.memory,
+        bend=0.0 if system.program is None else loop.bend,
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=_shares(loop, margin, system.robot.joints),
         unstable_modes=margin.unstable_roots,
@@ -152,6 +156,7 @@ def _of_program(along: Along, horizon: float | None) -> LocalMargins:
         jitter_s=0.0 if margin.unstable_roots else min(loop.jitter_ways().values()),
         channels_s=loop.channels(),
         memory=loop.memory,
+        bend=0.0 if system.program is None else loop.bend,
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=_shares(loop, margin, system.robot.joints),
         unstable_modes=margin.unstable_roots,

@@ -57,7 +57,7 @@ class MatrixController:
 
         rest = system.in_posture()
         joints = system.robot.joint_positions(system.posture)
-        self.linear = matrices
+        self.state_space = matrices
         self.offset = rest.tau_sea
         self.theta = joints + rest.tau_sea / system.actuators.spring_stiffness
         self._held = joints if matrices.of_links else self.theta
@@ -76,11 +76,11 @@ class MatrixController:
 
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
         """Write the command, and move x_c on."""
-        links = self.linear.of_links
+        links = self.state_space.of_links
         positions = measurement.q_joint if links else measurement.theta
         rates = measurement.v_joint if links else measurement.theta_dot
         y = np.concatenate([positions - self._held, rates])
-        out[:] = self.offset + self.linear.C @ self._state + self.linear.D @ y
+        out[:] = self.offset + self.state_space.C @ self._state + self.state_space.D @ y
         self._state = self._A @ self._state + self._B @ y
 
 
@@ -161,7 +161,9 @@ def _given(keys: MatrixKeys, folder: Path) -> dict[str, Array]:
 def _rows(name: str, rows: list[list[float]]) -> Array:
     if len({len(row) for row in rows}) > 1:
         raise InputError(f"{name} has rows of different lengths.")
-    return np.array(rows, dtype=float).reshape(len(rows), -1)
+    if not rows or not rows[0]:
+        raise InputError(f"{name} is empty; leave out A, B and C of a controller without memory.")
+    return np.array(rows, dtype=float)
 
 
 def _read_npz(path: Path) -> dict[str, Array]:

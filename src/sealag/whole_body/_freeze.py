@@ -1,6 +1,6 @@
 """Any controller, frozen: what ticks is differentiated about a state at rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,7 +108,7 @@ def freeze(
     posture = np.asarray(q, dtype=float)
     if posture.shape != (robot.nq,) or not np.isfinite(posture).all():
         raise InputError(f"q must be {robot.nq} finite numbers, got shape {posture.shape}.")
-    stated: Any = getattr(controller, "linear", None)
+    stated: Any = getattr(controller, "state_space", None)
     if stated is not None and theta is None:
         theta = getattr(controller, "theta", None)
     ticked = _Ticked(controller, robot, actuators, contacts=len(contacts), period=period)
@@ -124,7 +124,11 @@ def freeze(
         embedded_delay=embedded_delay,
     )
     return FrozenController(
-        loop=loop, rest=rest, bend=found.bend, memory=found.memory, unexplained=found.unexplained
+        loop=replace(loop, bend=found.bend),
+        rest=rest,
+        bend=found.bend,
+        memory=found.memory,
+        unexplained=found.unexplained,
     )
 
 
@@ -139,7 +143,12 @@ class _Found(NamedTuple):
 
 def _stated(own: Any, robot: Robot) -> _Found:
     """The matrices that a controller states, of all that can be measured."""
-    n, nv = robot.n, robot.nv
+    n, nv, s = robot.n, robot.nv, len(own.A)
+    for name, shape in {"A": (s, s), "B": (s, 2 * n), "C": (n, s), "D": (n, 2 * n)}.items():
+        if np.shape(getattr(own, name)) != shape:
+            raise InputError(
+                f"The controller's {name} is {np.shape(getattr(own, name))}; {shape} is right."
+            )
     at = slice(nv - n, nv) if own.of_links else slice(2 * nv, 2 * nv + n)
     gap = nv if own.of_links else n
     places = np.concatenate([np.arange(at.start, at.stop), np.arange(at.start, at.stop) + gap])
