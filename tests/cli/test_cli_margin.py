@@ -78,3 +78,29 @@ def test_a_rate_sweep_in_json(cli):
         known = one["largest_delay_s"] is not None
         assert one["proven_s"] <= (one["largest_delay_s"] if known else one["proven_s"])
         assert one["stable"] is True
+
+
+def test_a_program_is_said_to_remember_and_to_bend(tmp_path, cli):
+    """A PD with filtered rates, whose stiffness grows with its error."""
+    (tmp_path / "soft.py").write_text(
+        "import numpy as np\n\n\nclass Soft:\n"
+        "    def __init__(self, system):\n"
+        "        self.load = system.robot.gravity(system.posture)\n"
+        "        joints = system.robot.joint_positions(system.posture)\n"
+        "        self.target = joints + self.load / system.actuators.spring_stiffness\n\n"
+        "    def reset(self, t, measurement):\n        self.rate = 0.0 * self.load\n\n"
+        "    def tick(self, t, measurement, out):\n"
+        "        away = self.target - measurement.theta\n"
+        "        out[:] = self.load + 300.0 * away + 5e7 * away**3 - 2.0 * self.rate\n"
+        "        self.rate += 0.3 * (measurement.theta_dot - self.rate)\n\n\n"
+        "controller = Soft\n"
+    )
+    text = (EXAMPLES / "panda.toml").read_text()
+    head, rest = text.split("[controller]")
+    delays = rest[rest.index("[delays]") :]
+    project = tmp_path / "p.toml"
+    project.write_text(f'{head}[controller]\nkind = "python"\nfile = "soft.py"\n\n{delays}')
+    code, text, err = cli("margin", project)
+    assert (code, err) == (0, "")
+    assert "one way varies, every delay below it" in text
+    assert re.search(r"controller +7 states; bends by 0\.\d+ of its answers", text)

@@ -4,6 +4,7 @@ import copy
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
+import numpy as np
 import pytest
 from pydantic import BaseModel
 
@@ -72,6 +73,14 @@ JOINT_PD = {
     "tasks": None,
 }
 PROGRAM = {"controller": {"kind": "python", "file": "mine.py"}, "tasks": None}
+EYE = [[1.0, 0.0], [0.0, 1.0]]
+PD = [[-60.0, 0.0, -1.0, 0.0], [0.0, -60.0, 0.0, -1.0]]
+FILTER = {
+    "kind": "matrices", "A": [[-300.0, 0.0], [0.0, -300.0]], "C": EYE,
+    "B": [[0.0, 0.0, -300.0, 0.0], [0.0, 0.0, 0.0, -300.0]], "D": PD,
+}  # fmt: skip
+MATRICES = {"controller": FILTER, "tasks": None}
+FILED = {"controller": {"kind": "matrices", "file": "one.npz"}, "tasks": None}
 WALK = {"walking": {"feet": ["tip", "side"]}}
 ROUGH, STAIRS = {"kind": "rough"}, {"kind": "stairs", "rises_m": [0.1]}
 PRINTED = {"tasks": [{"name": "x", "kind": "posture", "stiffness": [50.0, 9.0]}]}
@@ -111,6 +120,11 @@ CHANGES: list[tuple[str, dict[str, Any], Any]] = [
         ("kp", 80.0), ("kd", 3.0), ("damping_at", "drive"))),
     *((f"controller.{key}", PROGRAM, value) for key, value in (
         ("file", "other.py"), ("function", "other"))),
+    *((f"controller.{key}", MATRICES, value) for key, value in (
+        ("A", [[-600.0, 0.0], [0.0, -300.0]]), ("B", [[-1.0, 0.0, -300.0, 0.0], [0.0] * 4]),
+        ("C", [[2.0, 0.0], [0.0, 1.0]]), ("D", [[-80.0, 0.0, -1.0, 0.0], PD[1]]),
+        ("inputs", ["j2", "j1"]), ("outputs", ["j2", "j1"]), ("time", "discrete"))),
+    ("controller.file", FILED, "other.npz"),
     ("tasks.kind", {}, "com"),
     ("tasks.stiffness", {}, 60.0),
     ("tasks.damping", {}, 2.0),
@@ -205,7 +219,8 @@ def put(project: dict[str, Any], key: str, value: Any) -> None:
 
 
 def answer(folder: Any, changes: dict[str, Any]) -> tuple[Any, str]:
-    """Return what certify says of a project, and its assumptions as one text."""
+    """Return what certify says of a project, and its assumptions as one text; of matrices, which it
+    refuses, the margins."""
     project = copy.deepcopy(BASE)
     for key, value in changes.items():
         put(project, key, copy.deepcopy(value))
@@ -216,6 +231,8 @@ def answer(folder: Any, changes: dict[str, Any]) -> tuple[Any, str]:
         motion = None
         if system.motion_file:
             motion = system.load_motion(system.motion_file)
+        if project["controller"].get("kind") == "matrices":
+            return system.local_margins(motion).summary(), ""
         found = sealag.certify(system, motion)
     except SealagError as error:
         return str(error), ""
@@ -234,6 +251,8 @@ def folder(tmp_path_factory):
         URDF.format(**PLAIN).replace('mass value="2"', 'mass value="4"')
     )
     (made / "mine.py").write_text("def controller(system):\n    return None\n")
+    np.savez(made / "one.npz", D=np.array(PD))
+    np.savez(made / "other.npz", D=2.0 * np.array(PD))
     (made / "samples.txt").write_text("4\n5\n6\n7\n")
     (made / "longer.txt").write_text("8\n9\n9\n9\n")
     (made / "one.csv").write_text("time_s,j1,j2\n0,0.4,0.5\n1,0.5,0.5\n")

@@ -21,6 +21,8 @@ TESTS = {
               "tests/unit/test_margin_sampled.py "
               "tests/oracle/test_margin_known_systems.py "
               "tests/property/test_margin_never_exceeded.py",
+    "memory": "tests/unit/test_design_matrices.py tests/unit/test_whole_body_freeze.py "
+              "tests/oracle/test_controllers_with_memory.py",
     "passivity": "tests/unit/test_passivity_bounds.py tests/unit/test_passivity_storage.py "
                  "tests/unit/test_passivity_motion.py tests/unit/test_passivity_windows.py "
                  "tests/unit/test_passivity_verify.py tests/unit/test_certificate_forgeries.py "
@@ -302,6 +304,30 @@ MUTANTS = [
          "a hold that costs nothing"),
         ("low, high = (middle, high) if self.stable(middle) else (low, middle)", "high = middle",
          "the last step"),
+        ("            right = right + says @ G\n", "", "what memory of a period says at once"),
+        ("keeps, gain = _integrated(A_c, one, T)", "keeps, gain = _integrated(A_c, T * one, 1.0)",
+         "memory that moves on for a period"),
+    ),
+    *_of(
+        "memory", "whole_body/_linear.py",
+        ("D = D - C @ B\n", "pass\n", "what the bilinear equivalent says at once"),
+        ("v[:, nv - n :] -= torque * actuators.spring_damping", "pass",
+         "damping of the springs in what they are measured at"),
+        ("if left < _EXPLAINED:", "if left < 1.0:", "memory with too few states"),
+    ),
+    *_of(
+        "memory", "whole_body/_frozen.py",
+        ("C = np.where(columns, np.vstack([C, scale * takes]), 0.0)",
+         "C = np.where(columns, np.vstack([C, 0.0 * takes]), 0.0)",
+         "what memory takes in of a late measurement"),
+    ),
+    *_of(
+        "memory", "design/_matrices.py",
+        ("self._state = np.zeros(len(self._A))\n\n", "pass\n\n", "memory that is forgotten"),
+        ("self._held = joints if matrices.of_links else self.theta", "self._held = joints",
+         "motor angles at rest"),
+        ('period=sample_time if keys.time == "discrete" else 0.0', "period=0.0",
+         "matrices of a period"),
     ),
     *_of(
         "design", "design/_rates.py",

@@ -128,6 +128,73 @@ def test_symmetries_are_left_out():
     )
 
 
+def lagging(a, k, **more):
+    """ẋ = u and ξ̇ = a (x − ξ), u = −k ξ."""
+    return DelayedLoop([[0.0, 0.0], [a, -a]], [[1.0], [0.0]], [[0.0, -k]], memory=1, **more)
+
+
+@pytest.mark.parametrize("a", [0.3, 20.0])
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_memory_that_ticks_has_its_characteristic_polynomial(a, share):
+    """ξ_{k+1} = e ξ + (1 − e) x and x_{k+1} = x − kT ξ: z² − (1 + e) z + e + kT (1 − e), kT < 1."""
+    k, T = 3.0, share / 3.0
+    e = math.exp(-a * T)
+    radius = lagging(a, k).sampled_radius(period=T, delay=0.0)
+    assert radius == pytest.approx(np.abs(np.roots([1.0, -1.0 - e, e + k * T * (1.0 - e)])).max())
+    assert (radius < 1.0) == (share < 1.0)
+
+
+def test_memory_of_a_period_is_its_own_matrices():
+    """A_d = 0: ξ_{k+1} = b x, u = −ξ, a command one tick late; nothing is said of other periods."""
+    T, b = 0.1, 4.0
+    # bilinear: A_c = −2/T, B_c = b, C_c = 4/T C, D_c = −C b
+    loop = DelayedLoop(
+        [[0.0, 0.0], [b, -2.0 / T]], [[1.0], [0.0]], [[b, -4.0 / T]], memory=1, memory_period=T
+    )
+    radius = loop.sampled_radius(period=T, delay=0.0)
+    late = DelayedLoop(*INTEGRATOR, [[-b]]).sampled_radius(period=T, delay=T)
+    assert radius == pytest.approx(late, rel=1e-9)
+    assert loop.sampled_margin(period=T).proven == 0.0
+    with pytest.raises(InputError, match="other rates"):
+        loop.sampled_margin(period=2.0 * T)
+
+
+def test_what_is_proven_beside_memory_counts_both_holds():
+    """Two multipliers: the rate of x by the command, and of what drives ξ."""
+    loop = lagging(20.0, 0.3)
+    for T in (0.05, 0.2):
+        found = loop.sampled_margin(period=T)
+        assert 0.0 < found.proven < min(found.delay, loop.jitter_margin().delay - T)
+    assert found.delay == pytest.approx(loop.margin().delay - 0.2, rel=2e-2)
+
+
+def test_memory_beside_symmetries():
+    one = lagging(5.0, 1.0)
+    wide = np.zeros((4, 4))
+    wide[0, 1], wide[3, 2:] = 1.0, one.A_0[1]
+    both = DelayedLoop(
+        wide, [[0.0], [0.0], [1.0], [0.0]], [[0.0, 0.0, 0.0, -1.0]], memory=1,
+        symmetries=np.eye(4)[:, :1],
+    )  # fmt: skip
+    radius = one.sampled_radius(period=0.1, delay=0.13)
+    assert both.sampled_radius(period=0.1, delay=0.13) == pytest.approx(radius, rel=1e-9)
+
+
+@pytest.mark.parametrize("memory", [-1, 2, 3, 0.5])
+def test_memory_that_is_no_part_of_the_states_is_named(memory):
+    with pytest.raises(InputError, match="memory is"):
+        DelayedLoop(
+            [[0.0, 0.0], [1.0, -1.0]], [[1.0], [0.0]], [[0.0, -1.0]], memory=memory
+        ).sampled_radius(period=0.1, delay=0.0)
+
+
+def test_memory_acts_through_the_command_only():
+    with pytest.raises(InputError, match="past its command"):
+        DelayedLoop(
+            [[0.0, 1.0], [1.0, -1.0]], [[1.0], [0.0]], [[0.0, -1.0]], memory=1
+        ).sampled_radius(period=0.1, delay=0.0)
+
+
 @pytest.mark.parametrize(
     ("period", "delay", "words"),
     [(0.0, 0.1, "period is 0 s"), (-1.0, 0.1, "period"), (0.1, -1.0, "delay"),

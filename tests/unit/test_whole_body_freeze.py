@@ -49,7 +49,7 @@ def test_the_whole_body_law_is_found_from_outside(name, signal):
     size = np.abs(inside.A_1).max()
     np.testing.assert_allclose(found.loop.A_1, inside.A_1, rtol=0.0, atol=2e-6 * size)
     np.testing.assert_allclose(found.loop.A_0, inside.A_0, rtol=0.0, atol=1e-10 * size)
-    assert found.memory < 5e-3  # the base follows the joints from tick to tick
+    assert found.memory < 2e-2  # the base follows the joints from tick to tick
     assert found.bend < 1e-3
     one, other = (loop.margin() for loop in (found.loop, inside))
     assert one.unstable_roots == other.unstable_roots

@@ -135,10 +135,16 @@ def margin_project(
     if found.not_passive:
         passive = f"none: {found.not_passive}"
     show(f"{'passive bound':26} {passive}")
-    show(f"{'jitter margin':26} {time_text(found.jitter_s):12} this robot, every delay below it")
+    varies = "one way varies, every delay below it" if found.memory else "every delay below it"
+    show(f"{'jitter margin':26} {time_text(found.jitter_s):12} this robot, {varies}")
     show(f"{'local margin':26} {time_text(found.delay_s):12} this robot, a constant delay: exact")
     for name, value in found.channels_s.items():
         show(f"{f'  only {name} late':26} {time_text(value)}")
+    if system.program is not None:
+        states = f"{found.memory} states" if found.memory else "no memory"
+        show(
+            f"{'controller':26} {states}; linear within {max(found.bend, 1e-6):.2g} of its answers"
+        )
     show(f"{'delay of the design':26} {time_text(system.delays.d_1)}")
     show(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
     if found.frequency_rad_s is not None:

@@ -34,6 +34,9 @@ class LocalMargins:
             controller with memory while one of both ways varies and the other is constant.
         channels_s: exact margin at the critical instant if only the position signals, or only the
             rates, of the command are late, s; empty if it feeds back no rates.
+        memory: states of the controller in the loop, that it moves at its ticks; 0 for a law.
+        bend: share of a program's answers that changes at half the step: it is not linear by that
+            much; 0 for a law and for matrices.
         frequency_rad_s: frequency of that pair, rad/s; None without one.
         mode: share of each joint's motor in that pair's motion.
         unstable_modes: roots with positive real part without delay, at that instant.
@@ -54,6 +57,8 @@ class LocalMargins:
     not_passive: str
     jitter_s: float | None
     channels_s: Mapping[str, float]
+    memory: int
+    bend: float
     frequency_rad_s: float | None
     mode: Mapping[str, float]
     unstable_modes: int
@@ -116,6 +121,8 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         not_passive="; ".join(bound.refusals),
         jitter_s=jitter_along(along, bounds, local),
         channels_s=loop.channels() if system.law.damped else {},
+        memory=loop.memory,
+        bend=0.0 if system.program is None else loop.bend,
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=_shares(loop, margin, system.robot.joints),
         unstable_modes=margin.unstable_roots,
@@ -148,6 +155,8 @@ def _of_program(along: Along, horizon: float | None) -> LocalMargins:
         not_passive=f"the controller is {system.no_law}",
         jitter_s=0.0 if margin.unstable_roots else min(loop.jitter_ways().values()),
         channels_s=loop.channels(),
+        memory=loop.memory,
+        bend=0.0 if system.program is None else loop.bend,
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=_shares(loop, margin, system.robot.joints),
         unstable_modes=margin.unstable_roots,

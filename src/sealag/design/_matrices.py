@@ -4,7 +4,7 @@ import io
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from sealag.files import read_whole
 from sealag.robot import Robot
 from sealag.typing import Array
 from sealag.whole_body import LinkAngles, Measurement
-
-if TYPE_CHECKING:
-    from sealag.design._design import Design
 
 _LARGEST_BYTES = 50_000_000
 _NAMES = ("A", "B", "C", "D")
@@ -44,8 +41,8 @@ class Matrices:
     period: float
     of_links: bool
 
-    def __call__(self, system: "Design") -> "MatrixController":
-        """Return the controller that ticks about the system's posture."""
+    def __call__(self, system: Any) -> "MatrixController":
+        """Return the controller that ticks about the posture of a `System`."""
         return MatrixController(self, system)
 
 
@@ -55,12 +52,12 @@ class MatrixController:
     Matrices in continuous time move on exactly with y_k held for the clock's period.
     """
 
-    def __init__(self, matrices: Matrices, system: "Design") -> None:
+    def __init__(self, matrices: Matrices, system: Any) -> None:
         from scipy.linalg import expm
 
         rest = system.in_posture()
         joints = system.robot.joint_positions(system.posture)
-        self.linear = matrices
+        self.state_space = matrices
         self.offset = rest.tau_sea
         self.theta = joints + rest.tau_sea / system.actuators.spring_stiffness
         self._held = joints if matrices.of_links else self.theta
@@ -79,11 +76,11 @@ class MatrixController:
 
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
         """Write the command, and move x_c on."""
-        links = self.linear.of_links
+        links = self.state_space.of_links
         positions = measurement.q_joint if links else measurement.theta
         rates = measurement.v_joint if links else measurement.theta_dot
         y = np.concatenate([positions - self._held, rates])
-        out[:] = self.offset + self.linear.C @ self._state + self.linear.D @ y
+        out[:] = self.offset + self.state_space.C @ self._state + self.state_space.D @ y
         self._state = self._A @ self._state + self._B @ y
 
 
@@ -164,7 +161,9 @@ def _given(keys: MatrixKeys, folder: Path) -> dict[str, Array]:
 def _rows(name: str, rows: list[list[float]]) -> Array:
     if len({len(row) for row in rows}) > 1:
         raise InputError(f"{name} has rows of different lengths.")
-    return np.array(rows, dtype=float).reshape(len(rows), -1)
+    if not rows or not rows[0]:
+        raise InputError(f"{name} is empty; leave out A, B and C of a controller without memory.")
+    return np.array(rows, dtype=float)
 
 
 def _read_npz(path: Path) -> dict[str, Array]:

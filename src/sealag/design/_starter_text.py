@@ -35,7 +35,10 @@ motor_damping = "FILL: D_theta, Nms/rad (Ns/m where the joint slides), embedded 
 # kind = "wbosc"               # the law of the tasks below; or joint_pd, which has no tasks but
 # kp (Nm/rad) and kd (Nms/rad), a number for all joints or a table with one of each, gravity,
 # feedback (motor or joint) and damping_at ("controller", where kd is late, or "drive"); or python,
-# with the file of a function (function) that makes what ticks from a System, and nothing else.
+# with the file of a function (function) that makes what ticks from a System, and nothing else; or
+# matrices: A, B, C, D (lists of rows, or a file of them, NPZ) of motors or joints (feedback), of
+# positions about the posture, then rates (inputs, outputs: names of joints, all if left out), and
+# time ("continuous", or "discrete" of sample_time_ms).
 feedback = "motor"             # motor | static_joint | static_joint_tank | joint
 gravity = "planned"            # feedback | planned | none
 stiffness_form = "symmetric"   # symmetric | published | force (without the task inertia)

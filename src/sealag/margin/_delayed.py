@@ -280,6 +280,11 @@ class DelayedLoop:
         loop, broken = self._parts()
         if loop.embedded:
             raise InputError("A sampled loop has one delay; there is an A_e with one of its own.")
+        if self.memory != 0 and self.memory not in range(1, len(self._present())):
+            raise InputError(
+                f"memory is {self.memory}; it counts the last of {len(self._present())} states, of "
+                "which one at least is not the controller's."
+            )
         if not self.memory:
             return Held.of(loop.A_0 + loop.A_e, broken.left, broken.right, period=period)
         return Held.with_memory(

@@ -1,6 +1,6 @@
 """Any controller, frozen: what ticks is differentiated about a state at rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,11 +24,13 @@ _SETTLED = 1e-11  # of the command: a smaller change from tick to tick is none
 _TICKS = 2000  # to settle, at most
 _ROUNDS = 200  # of motor angles that follow the command
 
-_REMEMBERS = 1e-2
+_REMEMBERS = 3e-2
 """Share of the answer to one kind of measurement that may come after the first tick and count as
-none. One Newton step a tick towards q̄(θ) leaves 1e-3 of it; a filter leaves most."""
+none. A base that follows the joints from tick to tick leaves 2e-2 of it; a filter leaves most."""
 
-_FELT = 1e-6  # share of the largest command: kinds of measurement that move it less count as unused
+_FELT = 1e-3
+"""Share of the largest command: kinds of measurement that move it less count as unused. A rate of
+1e-3 rad/s is set against an angle of 1e-4 rad, so that it is K_d < 1e-4 s K_p."""
 
 _UNEXPLAINED = 1e-3
 """Share of the answers from tick to tick that a linear memory may leave unexplained. Filters leave
@@ -106,7 +108,7 @@ def freeze(
     posture = np.asarray(q, dtype=float)
     if posture.shape != (robot.nq,) or not np.isfinite(posture).all():
         raise InputError(f"q must be {robot.nq} finite numbers, got shape {posture.shape}.")
-    stated: Any = getattr(controller, "linear", None)
+    stated: Any = getattr(controller, "state_space", None)
     if stated is not None and theta is None:
         theta = getattr(controller, "theta", None)
     ticked = _Ticked(controller, robot, actuators, contacts=len(contacts), period=period)
@@ -122,7 +124,11 @@ def freeze(
         embedded_delay=embedded_delay,
     )
     return FrozenController(
-        loop=loop, rest=rest, bend=found.bend, memory=found.memory, unexplained=found.unexplained
+        loop=replace(loop, bend=found.bend),
+        rest=rest,
+        bend=found.bend,
+        memory=found.memory,
+        unexplained=found.unexplained,
     )
 
 
@@ -137,7 +143,12 @@ class _Found(NamedTuple):
 
 def _stated(own: Any, robot: Robot) -> _Found:
     """The matrices that a controller states, of all that can be measured."""
-    n, nv = robot.n, robot.nv
+    n, nv, s = robot.n, robot.nv, len(own.A)
+    for name, shape in {"A": (s, s), "B": (s, 2 * n), "C": (n, s), "D": (n, 2 * n)}.items():
+        if np.shape(getattr(own, name)) != shape:
+            raise InputError(
+                f"The controller's {name} is {np.shape(getattr(own, name))}; {shape} is right."
+            )
     at = slice(nv - n, nv) if own.of_links else slice(2 * nv, 2 * nv + n)
     gap = nv if own.of_links else n
     places = np.concatenate([np.arange(at.start, at.stop), np.arange(at.start, at.stop) + gap])

@@ -93,7 +93,7 @@ class TickController(Protocol):
 
     One that also has `storage`, as `Controller.storage`, states the potential that it stores, which
     the passivity observer needs; one that has `tank_energy`, J, states what its tank holds. One
-    that has `linear`, with matrices `A`, `B`, `C`, `D` of n positions, then n rates, of the links
+    that has `state_space`, with `A`, `B`, `C`, `D` of n positions, then n rates, of the links
     if `of_links` is true, else of the motors, and their `period`, s, 0 in continuous time, states
     all that it does about the motor angles `theta` (n,): `freeze` does not differentiate it.
     """
