@@ -101,8 +101,7 @@ class Problem:
         if kind is not StiffnessForm.FORCE:
             _check_apart(rows, Lambda=inertia)
         even = all(_even(gain[..., at, at]) for at in rows)
-        if even and kind is StiffnessForm.PUBLISHED:  # k Λ is symmetric
-            inertia = symmetric(inertia)
+        inertia = symmetric(inertia) if even else inertia  # k Λ is symmetric
         root, root_error = _inverse_root(D_theta, n)
         batch = _common_batch(J_star=J, Lambda=inertia, K_x=gain, D_theta=root)
         scaled = J @ transposed(root)
