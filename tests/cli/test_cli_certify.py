@@ -46,6 +46,20 @@ def test_answers_with_the_contract(design, criterion, tmp_path, cli):
     assert json.loads(text)["valid"] is True
 
 
+def test_the_published_bound_is_null_where_only_a_program_tells_it(tmp_path, cli):
+    """Baxter's hands have one gain for positions, and another for orientations."""
+    out, design = tmp_path / "c.json", EXAMPLES / "baxter.toml"
+    answers = {}
+    for criterion in ("certified", "published"):
+        _, text, _ = cli("certify", design, "--criterion", criterion, "--json", "--out", out)
+        answers[criterion] = json.loads(text)
+    assert answers["certified"]["published_max_delay_s"] is None
+    assert answers["published"]["published_max_delay_s"] == answers["published"]["max_delay_s"]
+    _, text, _ = cli("certify", design, "--out", out)
+    assert "--criterion published tells" in text
+    assert cli("verify", out)[0] == 0
+
+
 def test_motion_of_many_instants(tmp_path, cli):
     from sealag.design import load
     from sealag.walking import GroundProfile, WalkPlan

@@ -39,8 +39,11 @@ FORGED = {
     "delay": ("baxter", "design: delay_s", lambda d: d.update(delay_s=0.001)),
     "times": ("moving", "design: time_s", _later),
     "unproven bound": ("moving", "design: bounds_s", _unproven_bound),
+    "published, not asked": (
+        "baxter", "design: published_max_delay_s", lambda d: d.update(published_max_delay_s=0.1),
+    ),
     "published": (
-        "baxter",
+        "moving",
         "design: published_max_delay_s",
         lambda d: d.update(published_max_delay_s=1.001 * d["published_max_delay_s"]),
     ),

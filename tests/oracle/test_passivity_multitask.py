@@ -48,6 +48,23 @@ def test_agrees_with_the_sdp(sizes, form):
         assert bound.upper >= reference * (1 - 1e-6)
 
 
+@pytest.mark.parametrize("sizes", [(2, 2), (1, 2, 3)])
+def test_levels_with_one_gain_each_need_no_solver(sizes):
+    """k Λ is symmetric: the published bound is that of all levels together, and the SDP agrees."""
+    for seed in range(2):
+        tasks, _, D = problem(seed, sizes, 3, "published")
+        tasks = [(J, Lambda, np.full(len(K), K[0])) for J, Lambda, K in tasks]
+        stated = problem_of(tasks, D, form="published")
+        assert stated.closed_form
+        bound = solve(stated, share=Instant(), solver=None)
+        reference = corollary_1([(J, Lambda * K) for J, Lambda, K in tasks], D)
+        assert bound.delay == pytest.approx(reference, rel=3e-6)
+        residual = bound.eased(1.0 - 1e-7).prove().residual()
+        assert residual.lowest > residual.rounding
+        tasks[-1][2][-1] *= 1.001
+        assert problem_of(tasks, D, form="published").closed_form == (sizes[-1] == 1)
+
+
 @pytest.mark.parametrize("every", [True, False])
 def test_published_batch_is_closed_where_it_is_smallest_or_everywhere(every):
     """Of a batch the solver closes every bracket, or those that can be the smallest."""

@@ -120,6 +120,23 @@ def test_the_same_crossings_by_counting_roots():
                 assert count == int((right.real > 0.0).sum())
 
 
+def test_roots_that_hardly_decay_are_counted_beside_a_crossing():
+    """ẋ = −x(t − d) crosses at π/2, beside oscillators with a damping of a millionth that it
+    pushes, so that the poles are no block of their own."""
+    A_0, A_1 = np.zeros((13, 13)), np.zeros((13, 13))
+    A_1[0, 0] = -1.0
+    for k, omega in enumerate(np.linspace(0.3, 30.0, 6)):
+        at = slice(1 + 2 * k, 3 + 2 * k)
+        A_0[at, at] = [[0.0, omega], [-omega, -2e-6 * omega]]
+        A_0[2 + 2 * k, 0] = 1.0
+    nothing = (0.0 * A_0, 1e-3)
+    for crossing, count in ((np.pi / 2.0, 0), (np.pi / 2.0 + 2.0 * np.pi, 2)):
+        data = with_loop(A_0, A_1, crossing=crossing, frequency=1.0, embedded=nothing)
+        check = answers(data)[NO_EARLIER]
+        assert check.ok is (count == 0)
+        assert f"{count} roots right of the axis" in check.detail
+
+
 def test_a_delay_of_the_embedded_part_moves_the_crossing():
     """ẋ = −x(t − e) − x(t − d)·0.5: with e = 0.3 jω is a root at another d than with e = 0."""
     A_0, A_1, A_e = np.array([[0.0]]), np.array([[-2.0]]), np.array([[-1.0]])

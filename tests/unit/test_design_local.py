@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import sealag
+from helpers.designs import EXAMPLES
 from helpers.small_systems import arm, arm_system, joint_task
 from sealag.design import load
 from sealag.passivity import Basis
@@ -138,6 +139,21 @@ def test_a_motion_whose_law_hardly_acts_is_decided(tmp_path, gain):
     assert np.isinf(bounds.delay).all() == (gain == 0.0)
     assert local.stable is True
     assert local.margin_s == np.inf
+
+
+@pytest.mark.parametrize("share", [1.0, 1e-3])
+def test_the_margin_of_a_posture_is_that_of_a_search_for_all_crossings(share):
+    """It is searched up to some bounds first, also where it lies hundreds of bounds beyond: no
+    bound relies on the motors' friction."""
+    system = load(EXAMPLES / "hume_held.toml")
+    D = system.actuators.motor_damping
+    drives = replace(system.actuators, motor_damping=share * D, viscous_friction=(1.0 - share) * D)
+    system = replace(system, actuators=drives)
+    answer = sealag.certify(system).answer
+    whole = system.frozen(rest=system.rest(system.still())).margin()
+    still = system.frozen().margin()
+    assert answer.local_margin_s == pytest.approx(min(whole.delay, still.delay), rel=1e-12)
+    assert (answer.local_margin_s > 32.0 * answer.max_delay_s) == (share < 1.0)
 
 
 def test_one_unstable_instant_makes_the_motion_unstable(tmp_path):

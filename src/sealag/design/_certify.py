@@ -56,7 +56,8 @@ class _Case:
         contraction: largest contraction factor of q̄(θ).
         F: (n, n) delayed stiffness of the criterion at the worst instant, Nm/rad.
         bound: of each instant by the criterion, as far as it is proven.
-        published: smallest bound by (29) or (31), s.
+        published: smallest bound by (29) or (31), s; NaN if it takes a semidefinite program that
+            was not asked for.
         common: with one multiplier for the whole motion; None if it was not asked for.
         time_varying: inside polytopes; None if it was not asked for.
         proofs: of instants.
@@ -234,7 +235,7 @@ def _answer(case: _Case) -> Answer:
         ),
         asymmetry=_finite(case.asymmetry),
         contraction=_finite(case.contraction),
-        published_max_delay_s=case.published,
+        published_max_delay_s=None if np.isnan(case.published) else case.published,
         common_multiplier_delay_s=float(case.common.delay) if case.common else None,
         time_varying_delay_s=float(case.time_varying.delay) if case.time_varying else None,
         left_open=_left_open(case),

@@ -56,7 +56,8 @@ class BoundsAlong:
 
     Attributes:
         bound: of each instant, 0 where a condition fails.
-        published: smallest bound by (29) or (31), s; NaN if it was not asked for.
+        published: smallest bound by (29) or (31), s; NaN if it was not asked for, or only a
+            semidefinite program tells it and the criterion is another.
         asymmetry: largest relative asymmetry of the criterion's stiffness.
         contraction: largest contraction factor of q̄(θ).
     """
@@ -89,11 +90,9 @@ def bounds_along(
     published = published or printed
     least, asymmetry = np.inf if published else np.nan, 0.0
     for rows, spaces in along.parts():
-        if published:
-            part = published_bounds(spaces, system, solver=solver)
-            least = min(least, float(part.delay.min()))
-        if not printed:
-            part = _unconditional(spaces, system)
+        told = _told(spaces, system, kind, solver) if published else None
+        least = np.nan if told is None else np.minimum(least, told.delay.min())
+        part = told if printed and told is not None else _unconditional(spaces, system)
         whole.add(rows, part)
         conditions.put(rows, spaces)
         F = delayed_stiffness(spaces, system, kind) if printed else None
@@ -102,7 +101,7 @@ def bounds_along(
     bound = whole.bound if printed else conditions.refuse(whole.bound, rest, along.motion)
     return BoundsAlong(
         bound=bound,
-        published=least,
+        published=float(least),
         asymmetry=float(asymmetry),
         contraction=float(conditions.contraction.max()),
     )
@@ -319,7 +318,19 @@ def published_bounds(spaces: Spaces, system: Design, *, solver: Solver | None = 
         The bound of each instant; of several levels the smallest one is as large as the solver
         proves, and others at least 1/Σ w(A_i).
     """
-    problem = Problem.of_tasks(
+    return _published(_printed_problem(spaces, system), solver)
+
+
+def _told(spaces: Spaces, system: Design, kind: Criterion, solver: Solver | None) -> Bound | None:
+    """The published bound; None where only a semidefinite program tells it, which takes minutes for
+    large robots, and the criterion is another."""
+    problem = _printed_problem(spaces, system)
+    asked = kind is Criterion.PUBLISHED or problem.closed_form
+    return _published(problem, solver) if asked else None
+
+
+def _printed_problem(spaces: Spaces, system: Design) -> Problem:
+    return Problem.of_tasks(
         spaces.J_star,
         spaces.Lambda,
         spaces.K_x,
@@ -327,6 +338,9 @@ def published_bounds(spaces: Spaces, system: Design, *, solver: Solver | None = 
         levels=spaces.levels,
         form=system.law.stiffness_form.printed,
     )
+
+
+def _published(problem: Problem, solver: Solver | None) -> Bound:
     bound = solve(problem, share=passivity.Instant(every=False), solver=solver)
     return bound.eased(PUBLISHED_SHARE)
 

@@ -31,6 +31,7 @@ _SLOW = 1e-4
 rounding keeps narrower pieces from being excluded, and each cut would double their number."""
 
 _CHUNK = 512
+_ROWS = 16  # substituted together, so that most products are of matrices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -261,9 +262,14 @@ class _Opened:
         (n, r), count = self.left.shape, len(omega)
         flat = np.empty((n, count * r), dtype=complex)
         rows = flat.reshape(n, count, r)
-        for i in range(n - 1, -1, -1):
-            rows[i] = self.left[i] + (self.triangle[i, i + 1 :] @ flat[i + 1 :]).reshape(count, r)
-            rows[i] /= (1j * omega - self.triangle[i, i])[:, None]
+        for end in range(n, 0, -_ROWS):
+            first = max(end - _ROWS, 0)
+            known = self.triangle[first:end, end:] @ flat[end:]
+            rows[first:end] = self.left[first:end, None] + known.reshape(-1, count, r)
+            for i in range(end - 1, first - 1, -1):
+                near = self.triangle[i, i + 1 : end] @ flat[i + 1 : end]
+                rows[i] += near.reshape(count, r)
+                rows[i] /= (1j * omega - self.triangle[i, i])[:, None]
         response = (self.right @ flat).reshape(r, count, r).swapaxes(0, 1)
         own = np.arange(r) < self.late
         turned = -np.expm1(-1j * omega[:, None] * np.where(own, delay, self.embedded))

@@ -256,7 +256,7 @@ def _published(c: Stated) -> Check:
     if c.question.criterion is Criterion.PUBLISHED:
         same, detail = claimed == c.answer.max_delay_s, "it is this certificate's bound"
     else:
-        same = claimed >= 0.0
+        same = claimed is None or claimed >= 0.0
         detail = "stated, not proven here: its proof is a certificate by the published criterion"
     return Check(name="published bound", ok=same, detail=detail)
 

@@ -100,6 +100,8 @@ class Problem:
         _check_apart(rows, K_x=gain)
         if kind is not StiffnessForm.FORCE:
             _check_apart(rows, Lambda=inertia)
+        even = all(_even(gain[..., at, at]) for at in rows)
+        inertia = symmetric(inertia) if even else inertia  # k Λ is symmetric
         root, root_error = _inverse_root(D_theta, n)
         batch = _common_batch(J_star=J, Lambda=inertia, K_x=gain, D_theta=root)
         scaled = J @ transposed(root)
@@ -115,7 +117,7 @@ class Problem:
             blocks=tuple(at.stop - at.start for at in rows),
             A_error=np.stack([np.broadcast_to(one.A_error, batch) for one in parts], axis=-1),
             M_error=np.stack([np.broadcast_to(one.M_error, batch) for one in parts], axis=-1),
-            semidefinite=kind is not StiffnessForm.PUBLISHED,
+            semidefinite=even or kind is not StiffnessForm.PUBLISHED,
         )
 
     @classmethod
@@ -157,6 +159,11 @@ class Problem:
         """Each level's rows of J and columns of M."""
         ends = np.cumsum(self.blocks)
         return [slice(int(end - size), int(end)) for end, size in zip(ends, self.blocks)]
+
+    @property
+    def closed_form(self) -> bool:
+        """Whether every instant by itself has a bound without a solver."""
+        return self.semidefinite or len(self.blocks) == 1
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -261,6 +268,11 @@ class _Level:
     M: Array
     A_error: Array
     M_error: Array
+
+
+def _even(gain: Array) -> bool:
+    """Whether a level has one gain k, K_x = k I."""
+    return np.array_equal(gain, gain[..., :1, :1] * np.eye(gain.shape[-1]))
 
 
 def _level(J: Array, inertia: Array, gain: Array, root_error: Array, kind: StiffnessForm) -> _Level:

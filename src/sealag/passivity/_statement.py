@@ -120,7 +120,9 @@ class Answer:
         worst: the instant that sets the bound.
         asymmetry: largest ‖F − Fᵀ‖ / ‖F + Fᵀ‖ over the motion, F the criterion's stiffness.
         contraction: largest contraction factor of q̄(θ) over the motion.
-        published_max_delay_s: what (29) or (31) as printed gives for the same design, s.
+        published_max_delay_s: what (29) or (31) as printed gives for the same design, s; None where
+            a level of several has gains that differ, so that only a semidefinite program tells it,
+            and the criterion is certified.
         common_multiplier_delay_s: bound with one multiplier for the whole motion, which V_4 needs;
             None if it was not asked for.
         time_varying_delay_s: bound for matrices that vary as they like inside polytopes around
@@ -150,7 +152,7 @@ class Answer:
     worst: Worst
     asymmetry: float | None
     contraction: float | None
-    published_max_delay_s: Time
+    published_max_delay_s: Time | None
     common_multiplier_delay_s: Time | None
     time_varying_delay_s: Time | None
     left_open: Mapping[str, str]
