@@ -20,7 +20,7 @@ class Binding:
 
     Attributes:
         kind: "delay"; "spring" where the springs have more of the limiting compliance; "stability"
-            where the loop beyond is unstable even without delay.
+            where the loop loses its stability before its passivity, or even without delay.
         instant: index of the instant.
         time_s: its time, s.
         joint: the joint with the largest share in the limiting motion.
