@@ -37,7 +37,7 @@ def copy(tmp_path):
         (GO2, ["--share", "direction"]),
         (GO2, ["--aim", "bandwidth", "--damping-ratio", "0.7"]),
     ],
-    ids=" ".join,
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
 def test_what_is_written_is_certified(example, options, copy, cli, tmp_path):
     project = copy(example)
@@ -107,7 +107,7 @@ def test_no_gain_is_a_no(copy, cli):
         (["--share", "task", "--number", "jitter"], "common"),
         (["--motion", "none.csv"], "none.csv"),
     ],
-    ids=" ".join,
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
 def test_a_question_without_an_answer_is_one_sentence(options, words, cli):
     code, out, err = cli("tune", GO2, *options)
