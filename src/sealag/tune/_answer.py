@@ -20,7 +20,7 @@ class Binding:
 
     Attributes:
         kind: "delay"; "spring" where the springs have more of the limiting compliance; "stability"
-            where the loop beyond is unstable even without delay.
+            where the loop loses its stability before its passivity, or even without delay.
         instant: index of the instant.
         time_s: its time, s.
         joint: the joint with the largest share in the limiting motion.
@@ -196,8 +196,12 @@ def number_of(question: Question, system: System) -> tuple[float | None, str]:
         return 0.0, "spring"
     except SolverError:
         return None, "delay"
-    value = margins.jitter_s if question.number is Number.JITTER else margins.delay_s
-    return value, "stability" if margins.unstable_modes else "delay"
+    return _of(question, margins), "stability" if margins.unstable_modes else "delay"
+
+
+def _of(question: Question, margins: Any) -> float | None:
+    """The jitter or the constant margin, s."""
+    return margins.jitter_s if question.number is Number.JITTER else margins.delay_s
 
 
 def _judged(
@@ -210,11 +214,12 @@ def _judged(
         place = (answer.worst.instant, answer.worst.time_s, answer.worst.direction)
         failing = () if answer.status is Status.CERTIFIED else answer.reasons
     else:
-        reached, _ = number_of(question, design)
-        if not reached:
-            return reached, None, ()
-        margins = design.local_margins(question.motion)
-        place, failing = (margins.instant, margins.time_s, margins.mode), ()
+        try:
+            margins = design.local_margins(question.motion)
+        except (ContractionError, SolverError) as error:
+            return None, None, (str(error),)
+        reached, failing = _of(question, margins), ()
+        place = (margins.instant, margins.time_s, margins.mode)
     if not reached:
         return reached, None, failing
     instant, time_s, joints = place

@@ -84,7 +84,7 @@ def stiffened(system: System, groups: Sequence[Group], factors: Array) -> System
     """
     tasks = []
     for i, task in enumerate(system.law.tasks):
-        scale = sum(factor * group.rows[i] for factor, group in zip(factors, groups))
+        scale = np.sum([f * group.rows[i] for f, group in zip(factors, groups)], axis=0)
         gains = np.asarray(task.stiffness, dtype=float)
         if gains.ndim == 0 and np.ptp(scale) == 0.0:
             gains = gains * scale[0]

@@ -132,8 +132,8 @@ def _fair(unit: Array) -> Array:
     import cvxpy as cp
 
     f = cp.Variable(len(unit))
-    eye = np.eye(unit.shape[-1])
-    limits = [
+    eye = cp.Constant(np.eye(unit.shape[-1]))
+    limits: list[Any] = [
         eye - sum(f[g] * unit[g, k] for g in range(len(unit))) >> 0 for k in range(unit.shape[1])
     ]
     problem = cp.Problem(cp.Maximize(cp.sum(cp.log(f))), limits)
@@ -178,7 +178,7 @@ def _cheapest(F: Array, weight: Array, least: Array) -> Array:
     import cvxpy as cp
 
     y = cp.Variable(len(weight))
-    limits = [cp.diag(y) - one >> 0 for one in F]
+    limits: list[Any] = [cp.diag(y) - one >> 0 for one in F]
     return np.maximum(
         _solved(cp.Problem(cp.Minimize(weight @ y), [*limits, y >= least]), y),
         np.maximum(least, 1e-12),
@@ -188,13 +188,14 @@ def _cheapest(F: Array, weight: Array, least: Array) -> Array:
 def _solved(problem: Any, variable: Any) -> Array:
     """Let Clarabel solve; what it says is measured by the caller."""
     import cvxpy as cp
+    from cvxpy import error as cvxpy_error
 
     tight = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
     try:
         with warnings.catch_warnings():  # of a solution that is inaccurate: it is measured
             warnings.simplefilter("ignore", UserWarning)
             problem.solve(solver=cp.CLARABEL, **tight)
-    except cp.error.SolverError as error:
+    except cvxpy_error.SolverError as error:
         raise SolverError(f"Clarabel found no gains: {error}") from error
     if variable.value is None:
         raise SolverError(f"Clarabel found no gains: {problem.status}")

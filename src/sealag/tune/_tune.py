@@ -22,6 +22,10 @@ _SCALES = (1e-3, 1e4)
 """Factors of the stiffness among which a margin is searched."""
 _BANDWIDTHS = (0.1, 1e4)
 """rad/s: bandwidths that are searched."""
+_SHARES = (1.0 - 1e-4, 1.0 - 1e-2, 0.95, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1)
+"""Shares of the passive limit that are tried where stability ends before."""
+_WIDTH = 1e-4
+"""Width to which such a share is bisected."""
 _BELOW = 0.99
 """Share of the passive gain at which a margin surely holds, whatever rounding says."""
 _BEYOND = 1.0 + 1e-3
@@ -118,16 +122,44 @@ def _stiffest(question: Question) -> Tuned:
     if at_limit.scale == 0.0:
         return Tuned.none(question, "gravity compensation alone is stiffer than the delay allows")
     factors, wall = knobs.stiffest(question.required * (1.0 + EASE))
-    names = {group.name: float(factor) for group, factor in zip(knobs.groups, factors)}
     common = question.share is Share.COMMON
-    return Tuned.of(
-        question,
-        knobs.design(factors),
-        factors=names,
-        scale=float(factors[0]) if common else None,
-        limit=_limit(at_limit.scale) if common else _mean(knobs.stiffest(question.required)[0]),
-        spring_share=wall.spring,
-    )
+    limit = _limit(at_limit.scale) if common else _mean(knobs.stiffest(question.required)[0])
+
+    def at(share: float, kind: str = "delay") -> Tuned:
+        gains = share * factors
+        return Tuned.of(
+            question,
+            knobs.design(gains),
+            kind=kind,
+            factors={group.name: float(gain) for group, gain in zip(knobs.groups, gains)},
+            scale=float(gains[0]) if common else None,
+            limit=limit,
+            spring_share=wall.spring if kind == "delay" else 0.0,
+        )
+
+    tuned = at(1.0)
+    if tuned.found or tuned.binding is None:
+        return tuned
+    share = _stable_share(lambda share: at(share).found)
+    return tuned if share is None else at(share, "stability")
+
+
+def _stable_share(holds: Callable[[float], bool]) -> float | None:
+    """The largest share of gains at their passive limit with which the loop is stable; None if
+    none is found.
+
+    Beside the springs' limit q̄(θ) has no last digits, and a law whose matrices move with its error
+    can lose its stability before it loses its passivity.
+    """
+    bad = 1.0
+    for good in _SHARES:
+        if holds(good):
+            while bad - good > _WIDTH:
+                middle = (good + bad) / 2.0
+                good, bad = (middle, bad) if holds(middle) else (good, middle)
+            return good
+        bad = good
+    return None
 
 
 def _limit(value: float) -> float | None:

@@ -1,0 +1,139 @@
+"""`sealag tune`: gains in words, in JSON and in the project file, which is certified then."""
+
+import json
+import tomllib
+
+import pytest
+
+from helpers.designs import EXAMPLES
+
+GO2, ANYMAL, PANDA = (EXAMPLES / f"{name}.toml" for name in ("go2", "anymal", "panda"))
+
+
+def comments(text):
+    """The comments of a TOML text without strings that hold a number sign."""
+    return [line.split("#", 1)[1].strip() for line in text.splitlines() if "#" in line]
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """Copies an example."""
+
+    def of(path):
+        target = tmp_path / path.name
+        target.write_bytes(path.read_bytes())
+        return target
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("example", "options"),
+    [
+        (ANYMAL, ["--safety", "1.2"]),
+        (ANYMAL, ["--share", "direction"]),
+        (ANYMAL, ["--aim", "damping"]),
+        (GO2, ["--aim", "damping"]),
+        (GO2, ["--share", "direction"]),
+        (GO2, ["--aim", "bandwidth", "--damping-ratio", "0.7"]),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
+)
+def test_what_is_written_is_certified(example, options, copy, cli, tmp_path):
+    project = copy(example)
+    before = project.read_text()
+    code, text, err = cli("tune", project, *options, "--write", project, "--json")
+    assert (code, err) == (0, "")
+    answer, after = json.loads(text), project.read_text()
+    assert after != before
+    assert comments(after) == comments(before)
+    code, text, _ = cli("certify", project, "--json", "--out", tmp_path / "c.json")
+    assert code == 0
+    certified = json.loads(text)
+    assert certified["max_delay_s"] == pytest.approx(answer["reached_s"], rel=1e-9)
+    assert certified["hashes"]["project"] == answer["certificate"]["hashes"]["project"]
+    assert cli("verify", tmp_path / "c.json", "--project", project)[0] == 0
+    again = json.loads(cli("tune", project, *options, "--json")[1])
+    for name in {"kp", "kd", "D_theta"} & set(answer):
+        assert again[name] == pytest.approx(answer[name], rel=1e-4)
+
+
+def test_an_answer_in_words(copy, cli):
+    code, text, err = cli("tune", GO2)
+    assert (code, err) == (0, "")
+    assert "factor of all stiffness    3.75" in text
+    assert "stopped by                 delay at " in text
+    assert "certified" in text
+
+
+def test_a_file_beside_the_project(copy, cli, tmp_path):
+    project, other = copy(GO2), tmp_path / "stiff.toml"
+    before = project.read_bytes()
+    assert cli("tune", project, "--write", other)[0] == 0
+    assert project.read_bytes() == before
+    assert tomllib.loads(other.read_text())["controller"]["kp"] == pytest.approx(150.0, rel=1e-5)
+
+
+def test_no_gain_is_a_no(copy, cli):
+    project = copy(GO2)
+    before = project.read_bytes()
+    code, text, _ = cli("tune", project, "--aim", "bandwidth=3000", "--write", project)
+    assert code == 1
+    assert "not tuned because" in text
+    assert project.read_bytes() == before
+    code, text, _ = cli("tune", PANDA, "--json")
+    answer = json.loads(text)
+    assert (code, answer["found"], answer["scale"], answer["binding"]) == (1, False, None, None)
+    assert "jitter" in answer["reasons"][0]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--aim", "speed"], "'speed'"),
+        (["--aim", "bandwidth=fast"], "bandwidth=NUMBER"),
+        (["--aim", "stiffness=3"], "bandwidth=NUMBER"),
+        (["--aim", "bandwidth=-3"], "bandwidth is -3"),
+        (["--number", "exact"], "'exact'"),
+        (["--share", "joint"], "'joint'"),
+        (["--safety", "0.5"], "safety is 0.5"),
+        (["--safety", "nan"], "safety is nan"),
+        (["--damping-ratio", "-1"], "damping_ratio is -1"),
+        (["--delay-ms", "1"], "2.000 ms"),
+        (["--delay-ms", "-1"], "delay"),
+        (["--delay-ms", "nan"], "delay"),
+        (["--aim", "drag"], "motion"),
+        (["--share", "task", "--aim", "damping"], "common"),
+        (["--share", "task", "--number", "jitter"], "common"),
+        (["--motion", "none.csv"], "none.csv"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
+)
+def test_a_question_without_an_answer_is_one_sentence(options, words, cli):
+    code, out, err = cli("tune", GO2, *options)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+
+
+def test_joint_pd_is_what_has_a_bandwidth(cli):
+    code, out, err = cli("tune", ANYMAL, "--aim", "bandwidth")
+    assert (code, out) == (2, "")
+    assert "joint PD" in err
+
+
+def test_files_that_are_not_written(copy, cli, tmp_path):
+    project = copy(GO2)
+    urdf = tmp_path / "robot.urdf"
+    cases = [
+        (["--write", tmp_path / "elsewhere" / "x.toml"], "folder"),
+        (["--write", project, "--delay-ms", "5"], "longer"),
+        (["--write", tmp_path], "regular file"),
+    ]
+    for options, words in cases:
+        code, out, err = cli("tune", project, *options)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert words in err
+    assert not urdf.exists()
+    code, _, err = cli("tune", "bundled:hume", "--write", "hume.toml")
+    assert code == 2
+    assert "folder" in err
