@@ -114,6 +114,8 @@ def test_soles_have_the_size_of_their_shapes():
 def test_a_human_whose_y_axis_points_up_stands_upright():
     feet = example("human_description/robots/human.urdf").feet()
     assert feet.upright == pytest.approx((math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)), abs=1e-6)
+    assert feet.half_length is None
+    assert "the z axis of left_foot is not up" in feet.reason
 
 
 def link(name, shape="", mass=1.0):
