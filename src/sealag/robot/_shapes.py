@@ -72,7 +72,7 @@ class Shapes:
             balls = self._mesh(element) if element.tag == "mesh" else _primitive(element)
             if balls is not None and len(balls.center):
                 moved = balls.moved(placement)
-                if np.isfinite(moved.center).all() and np.isfinite(moved.radius).all():
+                if np.isfinite(moved.center).all() and (moved.radius >= 0.0).all():
                     yield moved
 
     def _mesh(self, element: ElementTree.Element) -> Balls | None:
