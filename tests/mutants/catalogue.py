@@ -41,6 +41,7 @@ TESTS = {
               "tests/unit/test_design_cases.py "
               "tests/unit/test_design_questions.py tests/unit/test_design_system.py "
               "tests/unit/test_design_starter.py tests/unit/test_design_drift.py "
+              "tests/unit/test_design_standing.py tests/unit/test_design_drives.py "
               "tests/meta/test_no_silent_key.py tests/cli/test_cli_certify.py "
               "tests/cli/test_cli_bad_input.py tests/cli/test_cli_margin.py",
     "motion": "tests/unit/test_motion_columns.py tests/unit/test_motion_base.py",
@@ -52,7 +53,8 @@ TESTS = {
                   "tests/unit/test_design_network.py",
     "walking": "tests/unit/test_walking_plan.py tests/unit/test_walking_controller.py "
                "tests/reference/test_kernels_walking.py",
-    "robot": "tests/unit/test_robot_urdf.py tests/oracle/test_robot_against_mujoco.py "
+    "robot": "tests/unit/test_robot_urdf.py tests/unit/test_robot_feet.py "
+             "tests/oracle/test_robot_against_mujoco.py "
              "tests/oracle/test_robot_mimic.py tests/unit/test_design_cases.py",
     "files": "tests/unit/test_files.py tests/unit/test_report_mcap.py "
              "tests/cli/test_cli_outputs.py",
@@ -442,6 +444,12 @@ MUTANTS = [
          "bounds without a proof"),
     ),
     *_of(
+        "design", "design/_standing.py",
+        ("if not any(sets):", "if False:", "free fall"),
+        ("np.sort(heights)[(len(heights) - 1) // 2]", "heights.min()", "a foot below the others"),
+        ("outside > _OUTSIDE", "outside > 1.0", "centre of mass outside the feet"),
+    ),
+    *_of(
         "design", "design/_certify.py",
         ("if not reasons and (delay_s > largest or",
          "if not reasons and (delay_s > 2.0 * largest or",
@@ -623,6 +631,21 @@ MUTANTS = [
         ("pos - centre)", "pos)", "places of several joints"),
         ("inertia = frame.R @ own @ frame.R.T", "inertia = own", "turned inertia"),
         ("at = _HERE  # where", "pass  # where", "place of a free body"),
+    ),
+    *_of(
+        "robot", "robot/_feet.py",
+        ("return _no_frames(0, reason)._replace(contacts=contacts)", "return _no_frames(0, reason)",
+         "one foot alone"),
+        ("return not _SENSOR.isdisjoint(_words(name))", "return False", "sensors at a foot"),
+        ("return paired and", "return", "fingers in a row"),
+        ("max(ends) < rest - margin", "True", "what reaches lower than limbs"),
+    ),
+    *_of(
+        "robot", "robot/_stance.py",
+        ("shift, seeds = shift + off, 0", "shift, seeds = shift, 0", "centre of mass of a stance"),
+        ("side = 1.0 if len(self._legs) == 2 else -1.0", "side = -1.0", "knees of humanoids"),
+        ("error = np.concatenate([error, pin.log3(turned)])",
+         "error = np.concatenate([error, 0.0 * pin.log3(turned)])", "level soles"),
     ),
     *_of(
         "robot", "robot/_workspace.py",

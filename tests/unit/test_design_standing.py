@@ -11,7 +11,7 @@ import sealag
 from helpers.designs import EXAMPLES
 from sealag.robot import Contact, ContactKind
 
-FEET = ("LF_FOOT", "LH_FOOT", "RF_FOOT", "RH_FOOT")
+FEET = [f"{leg}_FOOT" for leg in ("LF", "LH", "RF", "RH")]
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,9 @@ def test_a_centre_of_mass_outside_the_feet_is_measured(anymal):
     com = robot.center_of_mass(q)[:2]
     way, off = right - left, com - left
     along = abs(way[0] * off[1] - way[1] * off[0]) / np.linalg.norm(way)
-    assert float(re.search(r"is ([\d.]+) m outside", said)[1]) == pytest.approx(along, abs=1e-3)
+    found = re.search(r"is ([\d.]+) m outside", said)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(along, abs=1e-3)
 
 
 def test_soles_reach_as_far_as_simulation_says(anymal):

@@ -1,5 +1,6 @@
 """A starter file names the robot's own joints and feet, and a posture that it can stand in."""
 
+import re
 import tomllib
 
 import numpy as np
@@ -87,6 +88,46 @@ def test_without_a_named_posture_hume_stands_on_bent_knees():
     assert right[2] == pytest.approx(0.0, abs=2e-3)
     middle = (left + right)[:2] / 2.0
     assert robot.center_of_mass(q)[:2] == pytest.approx(middle, abs=2e-3)
+
+
+@pytest.mark.parametrize("urdf", [
+    "bundled:hume.urdf", ANYMAL,
+    "example-robot-data:g1_description/urdf/g1_29dof_rev_1_0.urdf",
+    "example-robot-data:human_description/robots/human.urdf",
+    "example-robot-data:laikago_description/urdf/laikago.urdf",
+])  # fmt: skip
+def test_a_filled_starter_loads_and_stands(urdf, tmp_path):
+    path = tmp_path / "p.toml"
+    text = starter_project(urdf)
+    path.write_text(re.sub(r'"FILL[^"]*"', "1.0", text))
+    system = load(path)
+    assert len(system.contacts) >= 2
+    assert system.warnings() == ()
+
+
+def test_an_arm_is_held_and_a_flying_arm_is_asked_for():
+    urdf, told = "example-robot-data:ur_description/urdf/ur5_robot.urdf", []
+    data = tomllib.loads(starter_project(urdf, tell=told.append))
+    assert data["robot"]["base"] == "fixed"
+    assert "contacts" not in data
+    assert told[0].startswith("base: fixed, because no two limbs reach the ground as legs do")
+    assert "--base floating" in told[0]
+    assert tomllib.loads(starter_project(urdf, floating_base=True))["robot"]["base"] == "floating"
+
+
+def test_a_posture_outside_its_robot_s_limits_is_told():
+    """The makers' half-sitting posture of a robot whose URDF mixes up its limits."""
+    told = []
+    urdf = "example-robot-data:simple_humanoid_description/urdf/simple_humanoid.urdf"
+    starter_project(urdf, tell=told.append)
+    assert "LLEG_HIP_P is -0.453786 rad, outside its limits" in told[1]
+
+
+def test_soles_are_given_to_the_simulation():
+    urdf = "example-robot-data:talos_data/robots/talos_full_v2_box.urdf"
+    data = tomllib.loads(starter_project(urdf))
+    assert {contact["kind"] for contact in data["contacts"]} == {"surface"}
+    assert data["simulation"] == {"foot_half_length": 0.105, "foot_half_width": 0.065}
 
 
 def test_commented_keys_are_the_schema_s_with_its_defaults():

@@ -114,6 +114,8 @@ def test_soles_have_the_size_of_their_shapes():
 def test_a_human_whose_y_axis_points_up_stands_upright():
     feet = example("human_description/robots/human.urdf").feet()
     assert feet.upright == pytest.approx((math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)), abs=1e-6)
+    assert feet.half_length is None
+    assert "the z axis of left_foot is not up" in feet.reason
 
 
 def link(name, shape="", mass=1.0):
@@ -214,6 +216,24 @@ def test_limbs_without_names_are_no_legs_where_something_reaches_lower(tmp_path)
 
 def test_arms_that_hang_lowest_are_no_legs(tmp_path):
     assert read(biped(words=("upperarm", "forearm", "wrist")), tmp_path).feet().legs == 0
+
+
+@pytest.mark.parametrize(("places", "legs"), [
+    ([(0.0, 0.3), (0.0, 0.1), (0.0, -0.1), (0.0, -0.3)], 0),
+    ([(0.3, 0.2), (0.3, -0.1), (-0.3, 0.2), (-0.3, -0.1)], 0),
+    ([(0.3, 0.2), (0.3, -0.2), (-0.3, 0.2), (-0.3, -0.2)], 4),
+])  # fmt: skip
+def test_limbs_without_names_in_a_row_or_without_a_mirror_are_fingers(places, legs, tmp_path):
+    parts = [link("palm", box(0.6, 0.4, 0.1), 2.0)]
+    for number, (x, y) in enumerate(places):
+        chain = [("palm", f"{x} {y} 0"), (f"p{number}", "0 0 -0.2")]
+        for parent, xyz in chain:
+            child = f"{'p' if parent == 'palm' else 'q'}{number}"
+            parts += [link(child), joint(f"j{child}", parent, child, xyz, "0 1 0")]
+        parts += [link(f"t{number}"), joint(f"e{number}", f"q{number}", f"t{number}", "0 0 -0.2")]
+    found = read(f'<robot name="hand">{"".join(parts)}</robot>', tmp_path).feet()
+    assert found.legs == legs
+    assert found.frames == [f"t{number}" for number in range(legs)]
 
 
 def test_one_foot_is_no_pair_of_legs(tmp_path):

@@ -55,7 +55,7 @@ def _of_posture(design: Design) -> Iterator[str]:
         yield (
             f"the centre of mass is {outside:.3f} m outside the feet, at x = {com[0]:.3f} m and "
             f"y = {com[1]:.3f} m: no robot that stands freely is in balance there; correct the "
-            "posture (`sealag init` computes one) or [[contacts]]"
+            "posture or [[contacts]]"
         )
 
 

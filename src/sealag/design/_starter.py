@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sealag.design._starter_text import OPTIONAL, REQUIRED, SOLES
+from sealag.design._drives import PublishedDrives, published_drives
+from sealag.design._starter_text import DIFFERING, OPTIONAL, REQUIRED, SOLES
 from sealag.errors import InputError
 from sealag.robot import Contact, Robot, load_robot
 from sealag.typing import Array
@@ -88,8 +89,9 @@ def starter_project(
     posture = _posture(robot, ground)
     say(f"base: {'floating' if ground.floating else 'fixed'}, because {ground.why}")
     say(f"posture: {posture.origin}{_moved(posture.outside)}")
-    rotor = robot.rotor_inertia
-    known = bool((rotor > 0.0).all())
+    drives = published_drives(robot)
+    if drives is not None:
+        say(f"drives: {', '.join(_known(drives))} of {len(drives.joints)} joints, {drives.source}")
     required = REQUIRED.format(
         name=_text(robot.name),
         urdf=_text((str(urdf) if named is None else named).replace("\\", "/")),
@@ -97,10 +99,8 @@ def starter_project(
         why=_line(ground.why),
         actuated=_actuated(robot),
         posture=_posture_lines(robot, ground, posture),
-        rotor=f"{rotor.min():.6g}"
-        if known
-        else '"FILL: B reflected to the joint, kg m^2 (kg where the joint slides)"',
-        joint=_key(robot.joints[0]),
+        rotor=_rotor(robot, drives),
+        differing=_differing(robot, drives),
         contacts=_contacts(robot, ground) if ground.floating else "",
     )
     feet = ground.frames
@@ -230,6 +230,31 @@ def _contacts(robot: Robot, ground: _Ground) -> str:
         lines.append("# No feet were found: without contacts the robot flies.")
         lines += ["# [[contacts]]", f"# frame = {frame}", '# kind = "point"']
     return "\n".join([*lines, ""])
+
+
+def _rotor(robot: Robot, drives: PublishedDrives | None) -> str:
+    """The rotor inertia of joints that have none of their own in the file."""
+    rotor = robot.rotor_inertia
+    if (rotor > 0.0).all():
+        return f"{rotor.min():.6g}"
+    if drives is not None and set(drives.joints) == set(robot.joints):
+        return f"{min(keys['rotor_inertia'] for keys in drives.joints.values()):.6g}"
+    return '"FILL: B reflected to the joint, kg m^2 (kg where the joint slides)"'
+
+
+def _differing(robot: Robot, drives: PublishedDrives | None) -> str:
+    """The sections of joints whose drives are published, or one as a comment."""
+    if drives is None:
+        return DIFFERING.format(joint=_key(robot.joints[0]))
+    lines = [f"# Published: {drives.source}."]
+    for name, keys in drives.joints.items():
+        lines.append(f"[actuators.joint.{_key(name)}]")
+        lines += [f"{key} = {value:.6g}" for key, value in keys.items()]
+    return "\n".join(lines)
+
+
+def _known(drives: PublishedDrives) -> list[str]:
+    return sorted({key for keys in drives.joints.values() for key in keys})
 
 
 def _soles(half: tuple[float, float] | None) -> str:

@@ -27,9 +27,7 @@ motor_damping = "FILL: D_theta, Nms/rad (Ns/m where the joint slides), embedded 
 # torque_limit = 80.0          # Nm; the URDF's effort if left out
 # velocity_limit = 12.0        # rad/s; the URDF's velocity if left out
 # torque_bandwidth = 600.0     # rad/s, of the current loop; ideal if left out
-# Joints that differ:
-# [actuators.joint.{joint}]
-# spring_stiffness = 350.0
+{differing}
 {contacts}
 [controller]
 # kind = "wbosc"               # the law of the tasks below; or joint_pd, which has no tasks but
@@ -108,3 +106,8 @@ OPTIONAL = """\
 SOLES = """\
 # foot_half_length = 0.1       # m, of surfaces
 # foot_half_width = 0.06       # m, of surfaces"""
+
+DIFFERING = """\
+# Joints that differ:
+# [actuators.joint.{joint}]
+# spring_stiffness = 350.0"""

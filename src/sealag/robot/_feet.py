@@ -190,8 +190,15 @@ class _Search:
             contacts,
             *(half or (None, None)),
             tuple(np.round(turned, 6).tolist()),
-            f"{len(legs)} {what} end in {', '.join(names)}",
+            f"{len(legs)} {what} end in {', '.join(names)}{self._tilt(kind, frames)}",
         )
+
+    def _tilt(self, kind: ContactKind, frames: Sequence[Any]) -> str:
+        """A clause on soles whose frames are not level; empty if all are."""
+        tilted = [f.name for f in frames if self._placed(f).rotation[2, 2] < _ALONG]
+        if kind is ContactKind.POINT or not tilted:
+            return ""
+        return f" (the z axis of {tilted[0]} is not up, as `sealag simulate` needs it of a sole)"
 
     def called_feet(self, legs: Sequence[_Limb]) -> Feet:
         """The feet of legs that do not point down, if links at their ends are called so.

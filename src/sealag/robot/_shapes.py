@@ -71,8 +71,10 @@ class Shapes:
         placement = _placement(shape.find("origin"))
         for element in () if geometry is None else geometry:
             balls = self._mesh(element) if element.tag == "mesh" else _primitive(element)
-            if balls is not None and len(balls.center) and np.isfinite(balls.center).all():
-                yield balls.moved(placement)
+            if balls is not None and len(balls.center):
+                moved = balls.moved(placement)
+                if np.isfinite(moved.center).all() and (moved.radius >= 0.0).all():
+                    yield moved
 
     def _mesh(self, element: ElementTree.Element) -> Balls | None:
         path = self._file(element.get("filename", ""))
@@ -135,4 +137,6 @@ def _placement(origin: ElementTree.Element | None) -> pin.SE3:
     if origin is None:
         return pin.SE3.Identity()
     xyz, rpy = _numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0")
+    if len(xyz) != 3 or len(rpy) != 3:
+        return pin.SE3(np.eye(3), np.full(3, np.nan))  # no shape: it is nowhere
     return pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
