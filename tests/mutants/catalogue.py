@@ -701,7 +701,7 @@ MUTANTS = [
         ("stream.reconfigure(errors=\"backslashreplace\")", "pass", "letters that ASCII lacks"),
     ),
     *_of(
-        "cli", "cli/_app.py",
+        "cli", "cli/_main.py",
         ("return FAILED if isinstance(error, SolverError) else WRONG", "return WRONG",
          "status of a search that stopped"),
         ("if not answered and status in (0, 1):", "if False:", "an answer that nobody reads"),

@@ -120,7 +120,7 @@ def test_a_posture_outside_its_robot_s_limits_is_told():
     told = []
     urdf = "example-robot-data:simple_humanoid_description/urdf/simple_humanoid.urdf"
     starter_project(urdf, tell=told.append)
-    assert "LLEG_HIP_P is -0.453786 rad, outside its limits" in told[1]
+    assert "LLEG_HIP_P, LLEG_KNEE, LLEG_ANKLE_P, RLEG_ANKLE_P moved to the nearest limit" in told[1]
 
 
 def test_soles_are_given_to_the_simulation():

@@ -1,5 +1,5 @@
 """The command line `sealag`."""
 
-from sealag.cli._app import main
+from sealag.cli._main import main
 
 __all__ = ["main"]

@@ -19,6 +19,9 @@ _FOOT = ("sole", "foot", "feet", "toe", "toes", "paw", "hoof")
 _LEG = (*_FOOT, "leg", "ankle", "knee", "calf", "shank", "thigh", "hip", "kfe", "hfe", "haa")
 _HAND = ("arm", "hand", "finger", "gripper", "wrist", "elbow", "shoulder", "thumb", "rotor")
 _SENSOR = {"imu", "sensor", "ft", "skin", "camera", "optical", "dh", "world", "marker"}
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+"""Quaternion x, y, z, w of a base whose z axis is up."""
+
 _OWN_JOINTS = 2  # that a leg has at least: with one it is a wheel, a rotor or a gripper's finger
 _SOLE_JOINTS = 5  # from which a leg can keep a sole flat on the ground while the base moves
 _SHARED_JOINTS = 3  # that legs may have in common: a waist; fingers share an arm
@@ -27,7 +30,7 @@ _NEAR = 0.15  # of the robot's height: how far above the ground an ankle may be,
 _PATCH = 0.01  # m above its lowest point, what of a sole touches the ground
 _ALONG = 0.995  # cosine of 6°: how far from vertical the z axis of a sole's frame may be
 _LEAST_SOLE = 0.02  # m: what is smaller both ways is a point
-_UPRIGHT = (
+_ATTITUDES = (
     pin.SE3.Identity(),
     pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2.0, 0.0, 0.0), np.zeros(3)),
     pin.SE3(pin.rpy.rpyToMatrix(0.0, -np.pi / 2.0, 0.0), np.zeros(3)),
@@ -89,12 +92,12 @@ def find_feet(model: Any, urdf: Path | None, postures: Sequence[Array]) -> Feet:
             point down and soles are level.
     """
     shapes = Shapes(urdf)
-    level = _Search(model, shapes, postures[0], _UPRIGHT[0])
+    level = _Search(model, shapes, postures[0], _ATTITUDES[0])
     named = level.named_legs()
     if not named:
         legs = level.unnamed_legs()
         return level.feet_of(legs, "limbs reach lowest") if legs else level.none()
-    for q, upright in product(postures, _UPRIGHT):
+    for q, upright in product(postures, _ATTITUDES):
         search = _Search(model, shapes, q, upright)
         if search.stands_on(named):
             return search.feet_of(named, "limbs with names of legs")
@@ -102,7 +105,7 @@ def find_feet(model: Any, urdf: Path | None, postures: Sequence[Array]) -> Feet:
 
 
 def _no_frames(legs: int, reason: str) -> Feet:
-    return Feet(legs, (), None, None, (0.0, 0.0, 0.0, 1.0), reason)
+    return Feet(legs, (), None, None, UPRIGHT, reason)
 
 
 class _Search:

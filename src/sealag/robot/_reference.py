@@ -1,6 +1,6 @@
 """Postures that a robot's maker names: the group states of an SRDF beside the URDF."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -27,29 +27,35 @@ class ReferencePosture(NamedTuple):
     joints: dict[str, float]
     outside: dict[str, float]
 
-    def within(self, lower: Mapping[str, float], upper: Mapping[str, float]) -> "ReferencePosture":
+    def within(self, joints: Sequence[str], lower: Array, upper: Array) -> "ReferencePosture":
         """Return the posture with joints that are outside their limits at the nearer one.
 
         Args:
-            lower: limits by joint, rad or m.
-            upper: limits by joint, rad or m.
+            joints: (n,) names.
+            lower: (n,) limits, rad or m.
+            upper: (n,) limits, rad or m.
         """
-        joints = {
-            name: min(max(value, lower[name]), upper[name]) for name, value in self.joints.items()
-        }
-        moved = {name: value for name, value in self.joints.items() if value != joints[name]}
-        return self._replace(joints=joints, outside=moved)
+        asked = np.array([self.joints[name] for name in joints])
+        inside = dict(zip(joints, np.clip(asked, lower, upper).tolist(), strict=True))
+        moved = {name: value for name, value in self.joints.items() if value != inside[name]}
+        return self._replace(joints=inside, outside=moved)
 
 
-def posture_beside(urdf: Path, joints: Collection[str]) -> ReferencePosture | None:
+def posture_beside(
+    urdf: Path | None, joints: Sequence[str], lower: Array, upper: Array
+) -> ReferencePosture | None:
     """Find a posture in an SRDF in the URDF's folder, or in the folder `srdf` there or beside it.
 
     The file with the URDF's own name goes first, and a posture to stand in before others.
 
     Args:
-        urdf: the robot's file.
-        joints: its joints; a posture that names fewer than half of them is another robot's.
+        urdf: the robot's file; None if it is of none.
+        joints: (n,) its joints; a posture that names fewer than half of them is another robot's.
+        lower: (n,) limits, rad or m: joints that it puts outside are at the nearer one.
+        upper: (n,) limits, rad or m.
     """
+    if urdf is None:
+        return None
     folder, stem = urdf.resolve().parent, urdf.stem
     places = (folder, folder / "srdf", folder.parent / "srdf")
     files = [path for place in places for path in sorted(place.glob("*.srdf"))]
@@ -63,7 +69,7 @@ def posture_beside(urdf: Path, joints: Collection[str]) -> ReferencePosture | No
         for state in found:
             if state.name.startswith(wanted):
                 known = {name: state.joints.get(name, 0.0) for name in joints}
-                return state._replace(joints=known)
+                return state._replace(joints=known).within(joints, lower, upper)
     return None
 
 

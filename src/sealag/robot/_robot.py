@@ -12,7 +12,7 @@ import pinocchio as pin
 from sealag.constants import GRAVITY
 from sealag.errors import InputError, UnknownNameError, near
 from sealag.robot._contact import Contact
-from sealag.robot._feet import Feet, find_feet
+from sealag.robot._feet import UPRIGHT, Feet, find_feet
 from sealag.robot._limits import refuse_outside
 from sealag.robot._mimic import Coupling, Follower, couple
 from sealag.robot._reference import ReferencePosture, posture_beside, relaxed_positions
@@ -42,8 +42,7 @@ class Robot:
         joints: (n) names of the actuated joints, in the order of all arrays.
         followers: joints that move with one of `joints` and have no coordinate, by name. All terms
             (M, g, Jacobians, ...) are those of the coupled robot.
-        skipped: why a joint that moves cannot have an actuator, by its name; empty unless
-            `load_robot` was to skip such joints.
+        skipped: why joints that move cannot be actuated, by name, if `load_robot` skips such.
         remarks: what is read otherwise than the file says it, a sentence each.
         position_lower: (n,) rad or m, -inf where there is none; the followers' limits count.
         position_upper: (n,) rad or m, inf where there is none; the followers' limits count.
@@ -120,8 +119,7 @@ class Robot:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave scratch memory out of a pickle."""
-        names = [name for name in self.__slots__ if name != "_scratch"]
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in self.__slots__ if name != "_scratch"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore from a pickle."""
@@ -139,9 +137,6 @@ class Robot:
             q: (nq,).
             v: (nv,); at rest if None.
         """
-        return self._at(q, v)
-
-    def _at(self, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
         mine = self._scratch
         if not hasattr(mine, "workspace"):
             mine.workspace = self.workspace()
@@ -189,7 +184,7 @@ class Robot:
         joints: Mapping[str, float] | ArrayLike,
         *,
         base_position: ArrayLike = (0.0, 0.0, 0.0),
-        base_quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0),
+        base_quaternion: ArrayLike = UPRIGHT,
     ) -> Array:
         """Build a configuration.
 
@@ -241,14 +236,8 @@ class Robot:
     def reference_posture(self) -> ReferencePosture | None:
         """Return the posture that an SRDF beside the URDF names, one to stand in before others;
         None if there is none. Joints that it puts outside their limits are at the nearer one."""
-        if self.urdf_path is None:
-            return None
-        found = posture_beside(self.urdf_path, self.joints)
-        lower, upper = (
-            dict(zip(self.joints, ends.tolist(), strict=True))
-            for ends in (self.position_lower, self.position_upper)
-        )
-        return None if found is None else found.within(lower, upper)
+        limits = (self.position_lower, self.position_upper)
+        return posture_beside(self.urdf_path, self.joints, *limits)
 
     def relaxed_posture(self) -> Array:
         """Return joint positions (n,) that need no choice: those of `reference_posture`; without
@@ -258,22 +247,20 @@ class Robot:
 
     def feet(self) -> Feet:
         """Return the feet, found by where limbs end, by the links' shapes and by names."""
-        postures = (np.zeros(self.n), self.relaxed_posture())
-        at = [self._coupling.expand(self.configuration(joints)) for joints in postures]
+        straight, relaxed = np.zeros(self.n), self.relaxed_posture()
+        at = [self._coupling.expand(self.configuration(q)) for q in (straight, relaxed)]
         return find_feet(self._model, self.urdf_path, at)
 
-    def stance(
-        self, contacts: Sequence[Contact], upright: Sequence[float] = (0.0, 0.0, 0.0, 1.0)
-    ) -> Stance | None:
+    def stance(self, feet: Sequence[Contact], upright: Sequence[float] = UPRIGHT) -> Stance | None:
         """Return a posture to stand in: knees bent, feet level, the centre of mass between them;
         None if inverse kinematics finds none.
 
         Args:
-            contacts: one of each foot, at least two.
+            feet: one contact of each, at least two.
             upright: (4,) quaternion x, y, z, w of the base.
         """
         limits = self.position_lower, self.position_upper, self.relaxed_posture()
-        return find_stance(self._model, self._coupling, contacts, upright, *limits)
+        return find_stance(self._model, self._coupling, feet, upright, *limits)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Return the joints' part (…, n) of configurations.
@@ -318,7 +305,7 @@ class Robot:
         Args:
             q: (nq,).
         """
-        return self._at(q).M.copy()
+        return self.workspace_at(q).M.copy()
 
     def nonlinear_effects(self, q: ArrayLike, v: ArrayLike) -> Array:
         """Return h(q, v) (nv,) of Eq. (4): Coriolis, centrifugal and gravity torques.
@@ -327,7 +314,7 @@ class Robot:
             q: (nq,).
             v: (nv,).
         """
-        return self._at(q, v).nle.copy()
+        return self.workspace_at(q, v).nle.copy()
 
     def gravity(self, q: ArrayLike) -> Array:
         """Return the gravity torque g(q) (nv,).
@@ -335,7 +322,7 @@ class Robot:
         Args:
             q: (nq,).
         """
-        return self._at(q).gravity().copy()
+        return self.workspace_at(q).gravity().copy()
 
     def gravity_gradient(self, q: ArrayLike) -> Array:
         """Return ∂g/∂q (nv, nv): ∂²V/∂q², V the gravity potential, symmetric.
@@ -345,7 +332,7 @@ class Robot:
         Args:
             q: (nq,).
         """
-        return self._at(q).gravity_gradient()
+        return self.workspace_at(q).gravity_gradient()
 
     def center_of_mass(self, q: ArrayLike) -> Array:
         """Return the centre of mass (3,) of everything that moves, in the world, m.
@@ -353,7 +340,7 @@ class Robot:
         Args:
             q: (nq,).
         """
-        return self._at(q).com.copy()
+        return self.workspace_at(q).com.copy()
 
     def com_jacobian(self, q: ArrayLike) -> Array:
         """Return the Jacobian (3, nv) of the centre of mass.
@@ -361,7 +348,7 @@ class Robot:
         Args:
             q: (nq,).
         """
-        return self._at(q).com_jacobian().copy()
+        return self.workspace_at(q).com_jacobian().copy()
 
     def frame_names(self) -> tuple[str, ...]:
         """Return the names of all frames: links and joints."""
@@ -414,7 +401,7 @@ class Robot:
             frame: its name.
             q: (nq,).
         """
-        rotation, position = self._at(q).frame_placement(self.check_frame(frame))
+        rotation, position = self.workspace_at(q).frame_placement(self.check_frame(frame))
         return rotation.copy(), position.copy()
 
     def link_heights(self, links: Sequence[str], q: ArrayLike) -> Array:
@@ -427,8 +414,8 @@ class Robot:
         data = self._model.createData()
         start = self._coupling.expand(self._checked(q, self.nq, "configuration"))
         pin.framesForwardKinematics(self._model, data, start)
-        found = [self._model.getFrameId(name, pin.FrameType.BODY) for name in links]
-        return np.array([data.oMf[k].translation[2] for k in found])
+        numbers = (self._model.getFrameId(name, pin.FrameType.BODY) for name in links)
+        return np.array([data.oMf[number].translation[2] for number in numbers])
 
     def frame_jacobian(self, frame: str, q: ArrayLike) -> Array:
         """Return a frame's Jacobian (6, nv): linear then angular velocity, axes of the world.
@@ -437,7 +424,7 @@ class Robot:
             frame: its name.
             q: (nq,).
         """
-        return self._at(q).frame_jacobian(self.check_frame(frame)).copy()
+        return self.workspace_at(q).frame_jacobian(self.check_frame(frame)).copy()
 
     def contact_jacobian(self, contacts: Sequence[Contact], q: ArrayLike) -> Array:
         """Return J_s (c, nv), the contacts' rows below one another.
@@ -446,7 +433,7 @@ class Robot:
             contacts: which frames are held.
             q: (nq,).
         """
-        at = self._at(q)
+        at = self.workspace_at(q)
         rows = [at.frame_jacobian(self.check_frame(c.frame))[: c.kind.rows] for c in contacts]
         return np.vstack(rows) if rows else np.zeros((0, self.nv))
 
@@ -458,6 +445,6 @@ class Robot:
             q: (nq,).
             v: (nv,).
         """
-        at = self._at(q, v)
+        at = self.workspace_at(q, v)
         rows = [at.frame_bias(self.check_frame(c.frame))[: c.kind.rows] for c in contacts]
         return np.concatenate(rows) if rows else np.zeros(0)
