@@ -142,9 +142,7 @@ def margin_project(
         show(f"{f'  only {name} late':26} {time_text(value)}")
     if system.program is not None:
         states = f"{found.memory} states" if found.memory else "no memory"
-        show(
-            f"{'controller':26} {states}; linear within {max(found.bend, 1e-6):.2g} of its answers"
-        )
+        show(f"{'controller':26} {states}; bends by {max(found.bend, 1e-6):.1g} of its answers")
     show(f"{'delay of the design':26} {time_text(system.delays.d_1)}")
     show(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
     if found.frequency_rad_s is not None:

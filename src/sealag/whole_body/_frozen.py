@@ -376,7 +376,7 @@ class FrozenLoop(DelayedLoop):
             states=at.names(actuators.joints, drives, held=held),
             symmetries=at.take(at.z, kept.T).T,
             memory=at.memory_size if held else 0,
-            memory_period=memory.period if held else 0.0,
+            memory_period=memory.period if memory is not None and held else 0.0,
         )
 
     @staticmethod

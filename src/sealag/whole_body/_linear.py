@@ -81,7 +81,7 @@ class LinearLaw:
         impulses = np.concatenate([impulses, np.zeros((2 * w, *impulses.shape[1:]))])
 
         def hankel(first: int) -> Array:
-            rows = [np.hstack(impulses[first + i : first + i + w]) for i in range(w)]
+            rows = [np.hstack(list(impulses[first + i : first + i + w])) for i in range(w)]
             return np.vstack(rows)
 
         now, later = hankel(0), hankel(1)
