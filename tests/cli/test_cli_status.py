@@ -25,6 +25,7 @@ COMMANDS = {
     "init": (["init", "robot.urdf"], "sealag.design.starter_project"),
     "certify": (["certify", HELD], "sealag.design.load"),
     "margin": (["margin", HELD], "sealag.design.load"),
+    "tune": (["tune", HELD], "sealag.design.load"),
     "verify": (["verify", "c.json"], "sealag.passivity.Certificate.verify"),
     "simulate": (["simulate", HELD], "sealag.design.load"),
     "cite": (["cite"], "importlib.resources.files"),

@@ -137,3 +137,40 @@ def test_files_that_are_not_written(copy, cli, tmp_path):
     code, _, err = cli("tune", "bundled:hume", "--write", "hume.toml")
     assert code == 2
     assert "folder" in err
+
+
+def test_tasks_stiffer_than_springs_have_no_damping(tmp_path, cli):
+    project = tmp_path / "stiff.toml"
+    project.write_text(ANYMAL.read_text().replace("stiffness = 100.0", "stiffness = 1e5"))
+    code, text, err = cli("tune", project, "--aim", "damping")
+    assert (code, err) == (1, "")
+    assert "stiffer than the springs" in text
+
+
+def test_dotted_keys_that_leave_no_place_are_named(tmp_path, cli):
+    project = tmp_path / "dotted.toml"
+    dotted = "[actuators]\njoint.LF_HAA.motor_damping = 30.0\n[actuators.default]"
+    project.write_text(ANYMAL.read_text().replace("[actuators.default]", dotted))
+    before = project.read_bytes()
+    code, out, err = cli("tune", project, "--aim", "damping", "--write", project)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "dotted" in err
+    assert project.read_bytes() == before
+
+
+def test_windows_line_ends_and_a_table_of_gains_stay(tmp_path, cli):
+    legs = [
+        f"{leg}_{part}_joint"
+        for leg in ("FL", "FR", "RL", "RR")
+        for part in ("hip", "thigh", "calf")
+    ]
+    table = "".join(f"{name} = 40.0  # of {name}\n" for name in legs)
+    text = GO2.read_text().replace("kp = 40.0 ", "# kp below ")
+    text = text.replace("[delays]", f"[controller.kp]\n{table}[delays]")
+    project = tmp_path / "go2.toml"
+    project.write_bytes(text.replace("\n", "\r\n").encode())
+    assert cli("tune", project, "--write", project)[0] == 0
+    after = project.read_bytes().decode()
+    assert after.count("\n") == after.count("\r\n") == text.count("\n")
+    assert comments(after) == comments(text)
+    assert tomllib.loads(after)["controller"]["kp"][legs[3]] == pytest.approx(150.0, rel=1e-5)

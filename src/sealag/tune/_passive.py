@@ -83,7 +83,7 @@ def least_of(system: System) -> Array:
     return np.maximum(base_damping(system), LEAST_DAMPING)
 
 
-def damped(question: Question, delay: float) -> tuple[System, float]:
+def damped(question: Question, delay: float) -> tuple[System, float] | None:
     """Return the design with the least motor damping for a delay, and what it costs.
 
     The cost is trace D_θ, or the energy Σ D_i ∫θ̇_i² dt that it takes along the motion, J.
@@ -92,17 +92,17 @@ def damped(question: Question, delay: float) -> tuple[System, float]:
         question: what is asked.
         delay: to be tolerated, s.
 
+    Returns:
+        Both; None where the tasks are stiffer than the springs, which no damping mends.
+
     Raises:
-        InputError: the law has no delayed stiffness that a damping could be found for.
+        InputError: the motion moves no joint, whose drag is asked for.
         SolverError: the solver gives up.
     """
     system, motion = question.system, question.motion
     spaces = system.spaces(motion)
     if not (np.isfinite(spaces.F_theta).all() and (spaces.contraction < 1.0).all()):
-        raise InputError(
-            "The tasks are stiffer than the springs, which no damping mends; tune the stiffness "
-            "first (--maximize stiffness)."
-        )
+        return None
     F = (spaces.F_theta + np.swapaxes(spaces.F_theta, -1, -2)) / 2.0
     cost = np.ones(system.robot.n)
     if question.aim is Aim.DRAG and motion is not None:

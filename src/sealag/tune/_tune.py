@@ -173,8 +173,13 @@ def _mean(factors: Array) -> float:
 
 def _least_damping(question: Question) -> Tuned:
     """Least damping by the passive number; a margin goes on from there in its direction."""
-    _, cost = damped(question, question.required)
-    design, _ = damped(question, question.required * (1.0 + EASE))
+    at_limit = damped(question, question.required)
+    eased = damped(question, question.required * (1.0 + EASE))
+    if at_limit is None or eased is None:
+        return Tuned.none(
+            question, "the tasks are stiffer than the springs; tune the stiffness first"
+        )
+    (_, cost), (design, _) = at_limit, eased
     if question.number is Number.PASSIVE:
         return Tuned.of(question, design, limit=cost)
     drives, floor = design.actuators, least_of(question.system)

@@ -1,5 +1,6 @@
 """Gains written into the project file's text, with its comments and order kept."""
 
+import tomllib
 from collections.abc import MutableMapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 import tomlkit
 
 from sealag.design import System, load
+from sealag.errors import InputError
 from sealag.tune._question import pd_keys
 from sealag.typing import Array
 
@@ -21,6 +23,9 @@ def as_file(before: System, after: System) -> System:
 
     Returns:
         The design that is read from the edited text; `after` if there is no file.
+
+    Raises:
+        InputError: the file's dotted keys leave no place for the gains.
     """
     source = before.source
     if source is None:
@@ -33,7 +38,13 @@ def as_file(before: System, after: System) -> System:
             if not np.array_equal(old.stiffness, new.stiffness):
                 table["stiffness"] = _plain(new.stiffness)
         _put_damping(document, before, after)
-    read = load(source.files[0], text=tomlkit.dumps(document))
+    text = tomlkit.dumps(document)
+    if tomllib.loads(text) != document.unwrap():  # dotted keys, which TOML Kit cannot extend
+        raise InputError(
+            f"{source.files[0]}: the gains cannot be written beside its dotted keys; give each "
+            "joint a table of its own, [actuators.joint.NAME]."
+        )
+    read = load(source.files[0], text=text)
     return replace(read, delays=after.delays)
 
 
@@ -88,7 +99,7 @@ def base_damping(system: System) -> Array:
         return np.zeros(system.robot.n)
     if damps_late(system):
         return system.actuators.motor_damping
-    return np.maximum(system.actuators.motor_damping - kd_of_file(system), 0.0)
+    return _tidy(system.actuators.motor_damping - kd_of_file(system))
 
 
 def drive_kd(system: System, base: Array) -> Array:
@@ -98,8 +109,12 @@ def drive_kd(system: System, base: Array) -> Array:
         system: the design with all its damping.
         base: (n,) the motors' own.
     """
-    added = np.maximum(system.actuators.motor_damping - base, 0.0)
-    return np.array([float(f"{value:.12g}") for value in added])
+    return _tidy(system.actuators.motor_damping - base)
+
+
+def _tidy(difference: Array) -> Array:
+    """A difference without the last digits, which rounding made; 0 instead of a negative one."""
+    return np.array([float(f"{max(value, 0.0):.12g}") for value in np.round(difference, 12)])
 
 
 def _put_each(table: Any, key: str, names: Sequence[str], values: Array) -> None:
