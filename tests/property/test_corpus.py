@@ -36,8 +36,8 @@ STOPPED = {
     "allegro_hand_description/urdf/allegro_right_hand.urdf": _STEP,
     "tiago_description/robots/tiago_no_hand.urdf": _STEP,
 }
-"""Robots that `certify` answers, but that are not run with the numbers of the rule: fingers and a wrist that are
-too light for its springs. Besides them each one is run."""
+"""Robots that `certify` answers, but that are not run: fingers and a wrist that are too light for
+the rule's springs. Besides them each one is run."""
 
 LARGE = ("alex_", "b1-z1", "centauro", "g1_", "human", "icub", "pr2", "romeo", "talos_full",
          "talos_reduced", "tiago.", "tiago_dual", "tiago_pro")  # fmt: skip
