@@ -30,6 +30,15 @@ def word(name):
     return "SDF" if name.endswith(".sdf") else REFUSED.get(name)
 
 
+_STEP = "physics step of 0.01 ms is too long"
+STOPPED = {
+    "allegro_hand_description/urdf/allegro_left_hand.urdf": _STEP,
+    "allegro_hand_description/urdf/allegro_right_hand.urdf": _STEP,
+    "tiago_description/robots/tiago_no_hand.urdf": _STEP,
+}
+"""Robots that `certify` answers, but that are not run: fingers and a wrist that are too light for
+the rule's springs. Besides them each one is run."""
+
 LARGE = ("alex_", "b1-z1", "centauro", "g1_", "human", "icub", "pr2", "romeo", "talos_full",
          "talos_reduced", "tiago.", "tiago_dual", "tiago_pro")  # fmt: skip
 """Robots with 19 joints and more take up to minutes each: `make corpus` alone runs these."""
@@ -54,7 +63,8 @@ def test_all_answers_about_a_robot_agree(name, tmp_path):
     found = taken(FOLDER / name, tmp_path)
     print(f"{name}: {found.joints} joints, {found.verdict}, {found.seconds:.1f} s")
     assert found.findings == ()
-    assert found.refusal == ""
+    assert (found.refusal != "") == (name in STOPPED), found.refusal
+    assert STOPPED.get(name, "") in found.refusal
 
 
 def test_there_are_robots():
