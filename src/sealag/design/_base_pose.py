@@ -163,7 +163,7 @@ def pose_from_contacts(
 
 def _chosen(points: Sequence[Array], which: Array) -> Array:
     """Points of some contacts, one below the other."""
-    return np.concatenate([np.zeros((0, 3)), *(points[k] for k in np.flatnonzero(which))])
+    return np.concatenate([np.zeros((0, 3)), *(one for one, there in zip(points, which) if there)])
 
 
 def _fixes(points: Array) -> bool:

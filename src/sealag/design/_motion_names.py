@@ -75,7 +75,7 @@ def mapping_of(given: Mapping[str, str] | str | Path | None) -> dict[str, str]:
         raise InputError(
             f"columns has {wrong!r}; theirs=ours,theirs=ours is right, or a TOML or JSON file."
         )
-    split = [tuple(name.strip() for name in part.split("=")) for part in pairs]
+    split = [(part.split("=")[0].strip(), part.split("=")[1].strip()) for part in pairs]
     if len({theirs for theirs, _ in split}) < len(split):
         raise InputError(f"columns {said!r} names a column of the file twice.")
     return _checked(dict(split), "columns")
