@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from helpers.robots import urdf_path
 from sealag.design import load, starter_project
+from sealag.errors import ProjectError
 from sealag.robot import load_robot
 
 ANYMAL = "example-robot-data:anymal_b_simple_description/robots/anymal.urdf"
@@ -121,6 +122,14 @@ def test_a_posture_outside_its_robot_s_limits_is_told():
     urdf = "example-robot-data:simple_humanoid_description/urdf/simple_humanoid.urdf"
     starter_project(urdf, tell=told.append)
     assert "LLEG_HIP_P, LLEG_KNEE, LLEG_ANKLE_P, RLEG_ANKLE_P moved to the nearest limit" in told[1]
+
+
+def test_a_frame_left_to_be_filled_in_is_named(tmp_path):
+    path = tmp_path / "p.toml"
+    text = re.sub(r'"FILL[^"]*"', "1.0", starter_project("bundled:hume.urdf"))
+    path.write_text(text.replace('frame = "left_foot"', 'frame = "FILL: the link of a foot"', 1))
+    with pytest.raises(ProjectError, match=r"still to be filled in: contacts.*frame"):
+        load(path)
 
 
 def test_soles_are_given_to_the_simulation():

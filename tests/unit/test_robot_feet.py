@@ -260,6 +260,25 @@ def test_legs_whose_ends_have_no_frame_are_asked_for(tmp_path):
     assert "add a link by a fixed joint at the tip of fl_shank" in feet.reason
 
 
+def test_toes_that_do_not_hang_down_are_found_by_name(tmp_path):
+    """Legs folded along the trunk where the joints are at 0; the posture is computed."""
+    parts = [link("trunk", box(0.6, 0.2, 0.1), 8.0)]
+    for name, x, y in (("fl", 0.3, 0.1), ("fr", 0.3, -0.1), ("hl", -0.3, 0.1), ("hr", -0.3, -0.1)):
+        parts += [
+            link(f"{name}_upper", box(0.2, 0.02, 0.02, "-0.1 0 0")),
+            joint(f"{name}_hip", "trunk", f"{name}_upper", f"{x} {y} 0", "0 1 0", (-3.0, 3.0)),
+            link(f"{name}_lower", box(0.2, 0.02, 0.02, "0.1 0 0")),
+            joint(f"{name}_bow", f"{name}_upper", f"{name}_lower", "-0.2 0 0", "0 1 0", (0.1, 3.0)),
+            link(f"{name}_toe"), joint(f"{name}_tip", f"{name}_lower", f"{name}_toe", "0.2 0 0"),
+        ]  # fmt: skip
+    robot = read(f'<robot name="dog">{"".join(parts)}</robot>', tmp_path)
+    feet = robot.feet()
+    assert feet.frames == ["fl_toe", "fr_toe", "hl_toe", "hr_toe"]
+    stance = robot.stance(feet.contacts)
+    assert stance is not None
+    assert 0.2 < stance.height < 0.4
+
+
 def test_a_mesh_that_is_absent_broken_or_a_pipe_is_no_shape(tmp_path):
     (tmp_path / "bad.stl").write_bytes(b"solid nothing")
     os.mkfifo(tmp_path / "pipe.stl")

@@ -91,6 +91,13 @@ def _one_of(words: Iterable[str]) -> AfterValidator:
     return AfterValidator(check)
 
 
+def _filled(value: str) -> str:
+    """Refuse what a starter leaves to be filled in."""
+    if value.startswith("FILL"):
+        raise PydanticCustomError("range", "it must be the name of a frame")
+    return value
+
+
 def _by_shape(value: Any) -> str:
     return "list" if isinstance(value, list) else "number"
 
@@ -147,7 +154,7 @@ class ActuatorsSection(Section):
 class ContactSection(Section):
     """[[contacts]]"""
 
-    frame: str
+    frame: Annotated[str, AfterValidator(_filled)]
     kind: Annotated[str, _one_of(ContactKind)] = ContactKind.POINT.value
 
 

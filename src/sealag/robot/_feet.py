@@ -233,11 +233,13 @@ class _Search:
     def _ends(self) -> list[int]:
         """Last joints of limbs; toes are part of a foot that reaches as low."""
         ends = set(self._joints) - set(self._model.parents)
+        below = self._lowest(self._base) - _LEVEL * self._size
         for end in sorted(ends):
             parent = self._model.parents[end]
             if parent > self._base and self._shape(parent) and self._shape(end):
                 apart = self._lowest(parent) - self._lowest(end)
-                ends = (ends - {end}) | {parent} if abs(apart) < _PATCH else ends
+                if abs(apart) < _PATCH and self._lowest(parent) < below:
+                    ends = (ends - {end}) | {parent}
         inner = {j for end in ends for j in tuple(self._model.supports[end])[:-1]}
         return sorted(ends - inner)
 
