@@ -147,11 +147,11 @@ class _Way:
         try:
             said("init", self.robot, "--out", project)
         except RefusedError as error:
-            if "init --fixed" not in error.sentence:
+            if "init --base fixed" not in error.sentence:
                 raise
-        if not project.exists() or "\n[[contacts]]" not in project.read_text():
+        if not project.exists() or 'frame = "FILL' in project.read_text():
             project.unlink(missing_ok=True)  # nothing to stand on
-            said("init", self.robot, "--out", project, "--fixed")
+            said("init", self.robot, "--out", project, "--base", "fixed")
         described = self._filled(project)
         self.joints = described.n
         if read_only:
