@@ -60,7 +60,9 @@ class Shapes:
     def _of_link(self, name: str) -> Balls | None:
         """Return a link's balls in its own frame; None if it has no shape that can be read."""
         link = self._links.get(name)
-        for tag in () if link is None else ("collision", "visual"):
+        if link is None:
+            return None
+        for tag in ("collision", "visual"):
             found = [balls for shape in link.iterfind(tag) for balls in self._read(shape)]
             if found:
                 return Balls(*(np.concatenate(part) for part in zip(*found, strict=True)))
