@@ -144,14 +144,7 @@ class _Way:
     def whole(self, *, read_only: bool) -> Iterator[str]:
         """Run the commands; what contradicts itself."""
         project, certificate = self.folder / "project.toml", self.folder / "c.json"
-        try:
-            said("init", self.robot, "--out", project)
-        except RefusedError as error:
-            if "init --fixed" not in error.sentence:
-                raise
-        if not project.exists() or "\n[[contacts]]" not in project.read_text():
-            project.unlink(missing_ok=True)  # nothing to stand on
-            said("init", self.robot, "--out", project, "--fixed")
+        said("init", self.robot, "--out", project)
         described = self._filled(project)
         self.joints = described.n
         if read_only:

@@ -235,7 +235,7 @@ def check_inertias(model: Any, coupling: Coupling, path: Path) -> None:
     if ROOT_JOINT in weak:
         raise RobotError(
             f"{path}: link {weak[ROOT_JOINT]} has almost no inertia and would float; give it an "
-            "<inertial>, or let the base be fixed (init --fixed)."
+            "<inertial>, or let the base be fixed (init --base fixed)."
         )
     if weak:
         names = ", ".join(f"{link} (joint {joint})" for joint, link in weak.items())
