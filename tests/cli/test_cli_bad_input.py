@@ -229,7 +229,6 @@ URDFS = {
         arm(body(mass="1e-12", ixx="1e-15").replace("0.01", "1e-15")),
         "almost no inertia",
     ),
-    "massless base": (arm(), "link a has almost no inertia"),
     "no limit": (arm(limit=""), "limits"),
     "SDF": ('<sdf version="1.6"/>', "convert it to a URDF"),
     "odd type": (arm(kind="hinge"), "hinge"),
@@ -248,6 +247,18 @@ def test_urdf_problem_is_named(name, tmp_path, capfd):
     assert "r.urdf" in err
     assert word in err
     assert not (tmp_path / "o.toml").exists()
+
+
+def test_a_massless_base_is_fixed_and_does_not_float(tmp_path, capfd):
+    urdf, out = tmp_path / "r.urdf", tmp_path / "o.toml"
+    urdf.write_text(arm())
+    err = fails(capfd, "init", urdf, "--base", "floating", "--out", out)
+    assert "link a has almost no inertia" in err
+    assert "(init --base fixed)" in err
+    with pytest.raises(SystemExit) as stop:
+        main(["init", str(urdf), "--base", "fixed", "--out", str(out)])
+    assert stop.value.code == 0
+    assert 'base = "fixed"' in out.read_text()
 
 
 def test_good_arm_is_not_refused_and_mimics_have_no_actuator(tmp_path):
@@ -325,7 +336,9 @@ CSVS = {
     "text": (lambda lines: [*lines[:3], "a" + lines[3]], "row 3"),
     "short row": (lambda lines: [*lines[:3], lines[3].rpartition(",")[0]], "row 3"),
     "semicolons": (lambda lines: [line.replace(",", ";") for line in lines], "semicolons"),
+    "tabs": (lambda lines: [line.replace(",", "\t") for line in lines], "tabs"),
     "no names": (lambda lines: lines[1:], "column names"),
+    "a comment first": (lambda lines: ["# log of hume", *lines], "column names"),
     "no rows": (lambda lines: lines[:1], "no rows"),
     "name twice": (lambda lines: [line + "," + line.split(",")[0] for line in lines], "twice"),
 }

@@ -55,7 +55,8 @@ TESTS = {
                "tests/reference/test_kernels_walking.py",
     "robot": "tests/unit/test_robot_urdf.py tests/unit/test_robot_feet.py "
              "tests/oracle/test_robot_against_mujoco.py "
-             "tests/oracle/test_robot_mimic.py tests/unit/test_design_cases.py",
+             "tests/oracle/test_robot_mimic.py tests/oracle/test_robot_mjcf.py "
+             "tests/oracle/test_robot_mjcf_feet.py tests/unit/test_design_cases.py",
     "files": "tests/unit/test_files.py tests/unit/test_report_mcap.py "
              "tests/cli/test_cli_outputs.py",
     "export": "tests/unit/test_report_mujoco.py tests/oracle/test_export_mujoco.py",
@@ -631,6 +632,7 @@ MUTANTS = [
         ("pos - centre)", "pos)", "places of several joints"),
         ("inertia = frame.R @ own @ frame.R.T", "inertia = own", "turned inertia"),
         ("at = _HERE  # where", "pass  # where", "place of a free body"),
+        ("if len(spheres) == 1:", "if False:", "feet that are geoms"),
     ),
     *_of(
         "robot", "robot/_feet.py",

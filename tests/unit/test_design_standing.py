@@ -115,3 +115,38 @@ def test_the_command_line_says_it_first_and_in_json(tmp_path, cli):
     assert said.startswith("panda flies")
     _, out, _ = cli("certify", EXAMPLES / "panda.toml", "--out", tmp_path / "d.json", "--json")
     assert json.loads(out)["warnings"] == []
+
+
+def walked(system, *, lifted):
+    """A motion in which the base moves 0.2 m ahead over feet that hold; without its feet for a
+    while if they are lifted."""
+    count = 41
+    q = np.tile(system.posture, (count, 1))
+    q[:, 0] += np.linspace(0.0, 0.2, count)
+    index = np.zeros(count, dtype=np.int64)
+    if lifted:
+        index[1:-1] = 1
+    return sealag.Motion(
+        time=np.linspace(0.0, 4.0, count),
+        q=q,
+        v=np.zeros((count, system.robot.nv)),
+        contact_sets=(system.contacts, ()),
+        contact_index=index,
+    )
+
+
+def test_feet_that_move_while_they_hold_are_named(anymal):
+    said = anymal.warnings(walked(anymal, lifted=False))
+    assert len(said) == 4
+    for frame, text in zip([contact.frame for contact in anymal.contacts], said, strict=True):
+        assert text.startswith(f"contact {frame} holds at 4.000 s, but is 0.200 m from")
+        assert f"contact:{frame}" in text
+
+
+def test_feet_that_are_lifted_in_between_may_land_elsewhere(anymal):
+    assert anymal.warnings(walked(anymal, lifted=True)) == ()
+
+
+def test_the_crawl_stands_where_it_holds():
+    crawl = sealag.load(EXAMPLES / "anymal_crawl.toml")
+    assert crawl.warnings(crawl.motion_of()) == ()

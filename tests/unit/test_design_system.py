@@ -146,6 +146,13 @@ def test_parts_that_do_not_fit_are_refused_in_a_sentence(tmp_path, system):
         replace(system, posture=np.zeros(3))
     with pytest.raises(InputError, match="joint1"):
         replace(system, posture=np.array([0.0, 9.5]))
+    with pytest.raises(InputError, match="not finite"):
+        replace(system, posture=np.array([0.0, np.nan]))
+    for wrong in (None, 0.01):
+        with pytest.raises(InputError, match=f"delays is {wrong}; a Delays is needed"):
+            replace(system, delays=wrong)
+    with pytest.raises(InputError, match=r"contacts has foot; Contact\(frame=…\) is needed"):
+        replace(HUME, contacts=("foot",))
     with pytest.raises(InputError, match="base is fixed"):
         replace(system, contacts=(Contact(frame="link1"),))
     with pytest.raises(UnknownNameError, match="nose"):

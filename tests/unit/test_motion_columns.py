@@ -169,6 +169,38 @@ def test_what_is_missing_is_told_with_all_that_there_may_be(walk, tmp_path):
         assert name in said or name == "left_kne"
 
 
+def test_a_name_inside_a_longer_one_is_suggested(held, tmp_path):
+    columns = {f"/joint_states/{name}/position" if name != "time_s" else name: values
+               for name, values in table(held).items()}  # fmt: skip
+    joint = held.robot.joints[0]
+    with pytest.raises(MotionError, match=f"Then --columns /joint_states/{joint}/position={joint}"):
+        read(held, tmp_path / "m.npz", columns)
+
+
+def test_a_table_of_savetxt_is_read(held, tmp_path):
+    columns, path = table(held), tmp_path / "m.csv"
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns))
+    motion = held.load_motion(path)
+    np.testing.assert_allclose(motion.time, columns["time_s"], atol=1e-12)
+
+
+def test_a_column_without_a_name_is_mentioned(held, tmp_path):
+    columns, path = table(held), tmp_path / "m.csv"
+    rows = np.column_stack([np.arange(30), *columns.values()])
+    np.savetxt(path, rows, delimiter=",", header="," + ",".join(columns), comments="")
+    told = []
+    held.load_motion(path, tell=told.append)
+    assert told == [f"{path}: 1 column is not read: one without a name"]
+
+
+def test_names_that_are_objects_are_told_how_to_be_saved(held, tmp_path):
+    joints = np.array(held.robot.joints, dtype=object)
+    states = {"name": joints, "position": np.zeros((30, len(joints)))}
+    with pytest.raises(MotionError, match="dtype=str"):
+        read(held, tmp_path / "m.npz", {"time_s": np.arange(30.0), **states})
+
+
 def test_joint_states_of_ros_are_read_by_name(held, tmp_path):
     columns = table(held)
     joints = list(reversed(held.robot.joints))

@@ -257,7 +257,7 @@ def test_legs_whose_ends_have_no_frame_are_asked_for(tmp_path):
     feet = read(f'<robot name="dog">{"".join(parts)}</robot>', tmp_path).feet()
     assert feet.legs == 4
     assert feet.contacts == ()
-    assert "add a link by a fixed joint at the tip of fl_shank" in feet.reason
+    assert "add a link by a fixed joint, or in MJCF a site, at the tip of fl_shank" in feet.reason
 
 
 def test_toes_that_do_not_hang_down_are_found_by_name(tmp_path):

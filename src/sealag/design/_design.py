@@ -26,6 +26,8 @@ from sealag.whole_body import (
     freeze,
 )
 
+_PARTS = {"robot": Robot, "actuators": Actuators, "law": Law, "delays": Delays}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
@@ -66,10 +68,15 @@ class Design:
         """Refuse parts that do not fit each other.
 
         Raises:
-            InputError: actuators are of other joints, the posture has another shape or lies outside
-                the joints' limits, or a robot on a fixed base has contacts.
+            InputError: a part is of another kind, actuators are of other joints, the posture has
+                another shape, is not finite or lies outside the joints' limits, or a robot on a
+                fixed base has contacts.
             UnknownNameError: a frame or joint of a task or contact does not exist.
         """
+        for name, kind in _PARTS.items():
+            given = getattr(self, name)
+            if not isinstance(given, kind):
+                raise InputError(f"{name} is {str(given)[:100]}; a {kind.__name__} is needed.")
         object.__setattr__(self, "posture", np.asarray(self.posture, dtype=float))
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "delays", self.delays.sampled())
@@ -83,6 +90,8 @@ class Design:
                 f"The posture has shape {self.posture.shape}; ({self.robot.nq},) is right, as "
                 "`Robot.configuration` makes it."
             )
+        if not np.isfinite(self.posture).all():
+            raise InputError("The posture is not finite; each of its entries must be a number.")
         self.robot.require_within_limits(self.posture)
         if self.contacts and not self.robot.floating_base:
             raise InputError(
@@ -90,6 +99,8 @@ class Design:
                 "them out, or load the robot with a floating base."
             )
         for contact in self.contacts:
+            if not isinstance(contact, Contact):
+                raise InputError(f"contacts has {str(contact)[:100]}; Contact(frame=…) is needed.")
             self.robot.check_frame(contact.frame)
         self.law.gain(self.robot)
         self.law.drag(self.robot)

@@ -167,7 +167,7 @@ class Names:
         time = self._time(times)
         self._require({*found.values()}, time, left)
         if left:
-            shown = ", ".join(left[:_FEW])
+            shown = ", ".join(name or "one without a name" for name in left[:_FEW])
             more = f" and {len(left) - _FEW} more" if len(left) > _FEW else ""
             self.tell(
                 f"{self.path}: {len(left)} column{'s are' if len(left) > 1 else ' is'} not read: "
@@ -202,7 +202,9 @@ class Names:
 
     def _wrong(self, problem: str, name: str, others: Sequence[str] = ()) -> MotionError:
         """An error that lists all columns there may be."""
-        close = difflib.get_close_matches(name, list(others)[:1000], n=1)
+        some = list(others)[:1000]
+        close = difflib.get_close_matches(name, some, n=1)
+        close = close or [other for other in some if name.lower() in other.lower()]
         hint = f"; is it {close[0]!r}? Then --columns {close[0]}={name}" if close else ""
         base = f"{', '.join(self.base)} (or none of these, then contacts give the base's pose), "
         contacts = ", ".join(CONTACT + contact.frame for contact in self.contacts)

@@ -58,6 +58,8 @@ def read_table(path: Path, choose: Choose, tell: Callable[[str], None]) -> dict[
             raise
         except Exception as error:
             reason = " ".join(str(error).split())[:200].rstrip(".")
+            if "allow_pickle" in reason:
+                reason = "it holds Python objects; save names by np.array(names, dtype=str)"
             raise MotionError(f"{path} cannot be read as a motion: {reason}.") from error
         return {name: _column(values, name, path) for name, values in table.items()}
 
@@ -125,10 +127,13 @@ def _read_csv(file: BinaryIO, path: Path, choose: Choose) -> dict[str, Array]:
     text = io.TextIOWrapper(file, encoding="utf-8-sig", newline="")
     lines = csv.reader(text, strict=True)
     names = [name.strip() for name in next(lines, [])]
-    if not names or number_of(names[0]) is not None:
+    if len(names) > 1:
+        names[0] = names[0].removeprefix("#").strip()  # as np.savetxt writes it
+    if not names or number_of(names[0]) is not None or names[0].startswith("#"):
         raise MotionError(f"{path} does not begin with a row of column names, such as time_s.")
-    if ";" in names[0]:
-        raise MotionError(f"{path} has semicolons between its cells; commas are right.")
+    for mark, called in ((";", "semicolons"), ("\t", "tabs")):
+        if len(names) == 1 and mark in names[0]:
+            raise MotionError(f"{path} has {called} between its cells; commas are right.")
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
         raise MotionError(f"{path}: the column name {twice!r} occurs twice.")

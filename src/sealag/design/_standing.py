@@ -11,6 +11,7 @@ from sealag.typing import Array
 _APART = 0.01  # m: soles and toes of one posture differ by less, a lifted foot by more
 _OUTSIDE = 0.005  # m: what rounding and the radius of a foot explain
 _DIRECTIONS = 720  # in which the support is looked at: distances are right to 1e-5 of themselves
+_LOOKED_AT = 2000  # instants of a motion: each costs 20 us, and feet slip or step for longer
 _CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
 
 
@@ -19,7 +20,8 @@ def standing_warnings(design: Design, motion: Motion | None) -> tuple[str, ...]:
 
     A certificate holds for the contacts that the design states, wherever they are; these sentences
     say where that is not what a person would mean. Along a motion feet may stand on steps and the
-    centre of mass may be anywhere: only contacts that are missing altogether are told.
+    centre of mass may be anywhere: contacts that are missing altogether are told, and those that
+    move while they hold.
 
     Args:
         design: the robot, its contacts and its posture.
@@ -34,7 +36,7 @@ def standing_warnings(design: Design, motion: Motion | None) -> tuple[str, ...]:
             "so that all of this is about free fall; give [[contacts]], or base = \"fixed\" in "
             "[robot] for a robot that is held",
         )  # fmt: skip
-    return tuple(_of_posture(design)) if motion is None else ()
+    return tuple(_of_posture(design) if motion is None else _of_motion(design, motion))
 
 
 def _of_posture(design: Design) -> Iterator[str]:
@@ -57,6 +59,28 @@ def _of_posture(design: Design) -> Iterator[str]:
             f"y = {com[1]:.3f} m: no robot that stands freely is in balance there; correct the "
             "posture or [[contacts]]"
         )
+
+
+def _of_motion(design: Design, motion: Motion) -> Iterator[str]:
+    """Contacts that are elsewhere than where they began to hold, by more than `_APART`."""
+    at = np.unique(np.linspace(0, len(motion) - 1, _LOOKED_AT).astype(int))
+    for contact in dict.fromkeys(held for some in motion.contact_sets for held in some):
+        holds = np.array([contact in some for some in motion.contact_sets])[motion.contact_index]
+        stretch = np.cumsum(~holds)[at]  # the same for two instants only if it holds in between
+        began, began_in, farthest, when = np.zeros(3), -1, 0.0, 0.0
+        for instant, number in zip(at[holds[at]], stretch[holds[at]], strict=True):
+            position = design.robot.frame_placement(contact.frame, motion.q[instant])[1]
+            if number != began_in:
+                began, began_in = position, number
+            moved = float(np.linalg.norm(position - began))
+            if moved > farthest:
+                farthest, when = moved, float(motion.time[instant])
+        if farthest > _APART:
+            yield (
+                f"contact {contact.frame} holds at {when:.3f} s, but is {farthest:.3f} m from "
+                f"where it began to hold: give contact:{contact.frame} with 0 where it is lifted, "
+                "or correct the base's pose"
+            )
 
 
 def _support(design: Design, placed: list[tuple[Array, Array]]) -> Array:

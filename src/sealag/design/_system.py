@@ -142,7 +142,8 @@ class System(Design):
 
     def warnings(self, motion: Motion | None = None) -> tuple[str, ...]:
         """Return what keeps a floating-base robot from standing as the design says: no contacts, a
-        foot above or below the others, a centre of mass outside the feet.
+        foot above or below the others, a centre of mass outside the feet; along a motion also a
+        foot that moves while it holds.
 
         Args:
             motion: what is certified; the posture if None.

@@ -183,7 +183,7 @@ class _Search:
             return _no_frames(
                 len(legs),
                 f"{len(legs)} {what} end on the ground, but no link's frame is there: add a link "
-                f"by a fixed joint at the tip of {', '.join(ends)}",
+                f"by a fixed joint, or in MJCF a site, at the tip of {', '.join(ends)}",
             )
         kind, half = self._soles(legs, frames)
         contacts = tuple(Contact(frame=name, kind=kind) for name in names)
@@ -193,8 +193,25 @@ class _Search:
             contacts,
             *(half or (None, None)),
             tuple(np.round(turned, 6).tolist()),
-            f"{len(legs)} {what} end in {', '.join(names)}{self._tilt(kind, frames)}",
+            f"{len(legs)} {what} end in {', '.join(names)}{self._tilt(kind, frames)}"
+            f"{self._unseen(kind, legs, frames)}",
         )
+
+    def _unseen(self, kind: ContactKind, legs: Sequence[_Limb], frames: Sequence[Any]) -> str:
+        """A clause on points that are at the leg's last joint, with no shape that says they are
+        its tip; empty if there is none."""
+        if kind is ContactKind.SURFACE:
+            return ""
+        for limb, frame in zip(legs, frames, strict=True):
+            at_joint = float(np.linalg.norm(frame.placement.translation)) < _PATCH
+            named = any(frame.name == other.name for other in self._named(limb.end))
+            if at_joint and not named and self._shape(limb.end) is None:
+                return (
+                    f" (no shape says where {frame.name} touches the ground: its frame is at its "
+                    "joint; if that is a knee, add a link by a fixed joint, or in MJCF a site, at "
+                    "its tip)"
+                )
+        return ""
 
     def _tilt(self, kind: ContactKind, frames: Sequence[Any]) -> str:
         """A clause on soles whose frames are not level; empty if all are."""

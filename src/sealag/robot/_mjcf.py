@@ -51,8 +51,9 @@ def urdf_of_mjcf(root: Element, path: Path) -> Element:
     """Return a URDF's root element with the tree of an MJCF file.
 
     Bodies and sites become links below a link world, several joints of a body a chain of them.
-    Position limits, damping, friction, armature and the force range of joints are kept; geoms,
-    actuators, sensors and key frames are not.
+    Position limits, damping, friction, armature and the force range of joints are kept, geoms as
+    shapes of links; actuators, sensors and key frames are not. A body's only colliding sphere is a
+    link too, with its name or `<body>_sphere`: it is the foot of a leg that ends in no body.
 
     Args:
         root: the root element, files included.
@@ -77,12 +78,25 @@ class _Translation:
             self._read_default(one, self.defaults["main"], "main")
         self.robot = Element("robot", name=root.get("model") or path.stem)
         self.taken: dict[str, set[str]] = {"link": {WORLD}, "joint": set()}
+        self.spheres: list[tuple[str, str, _Pose]] = []
+        """Name, body's link and place of spheres, which take names that nothing else has."""
+        self.meshes = {
+            one.get("name") or Path(one.get("file", "")).stem: self._with_defaults(
+                one, "mesh", "main"
+            )
+            for one in root.iterfind("asset/mesh")
+            if one.get("file")
+        }
 
     def urdf(self) -> Element:
         self._refuse_what_is_not_read()
         self._link(WORLD)
         for world in self.root.iterfind("worldbody"):
             self._children(world, WORLD, _HERE, "main")
+        for name, body, at in self.spheres:
+            found = self._new("link", name)
+            self._link(found)
+            self._fix(body, found, at)
         return self.robot
 
     def _refuse(self, what: str) -> RobotError:
@@ -146,7 +160,9 @@ class _Translation:
 
     def _body(self, body: Element, parent: str, at: _Pose, childclass: str) -> None:
         name = self._new("link", body.get("name") or f"{parent}_body")
-        self._inertial(body, self._link(name), childclass)
+        link = self._link(name)
+        self._inertial(body, link, childclass)
+        self._shapes(body, link, childclass)
         joints = [one for one in body if one.tag in _JOINTS]
         if any(one.tag == "freejoint" or one.get("type") == "free" for one in joints):
             at = _HERE  # where a free body is drawn is its position, not its joint's place
@@ -221,6 +237,56 @@ class _Translation:
         SubElement(made, "mass", value=given.get("mass", ""))
         entries = {f"i{'xyz'[i]}{'xyz'[j]}": inertia[i, j] for i in range(3) for j in range(i, 3)}
         SubElement(made, "inertia", {key: repr(float(value)) for key, value in entries.items()})
+
+    def _shapes(self, body: Element, link: Element, childclass: str) -> None:
+        """The geoms of a body as the shapes of its link; what has no shape in a URDF is left out.
+
+        A geom that collides with nothing is what is seen of the link.
+        """
+        spheres: list[tuple[str, _Pose]] = []
+        for one in body.iterfind("geom"):
+            geom = self._with_defaults(one, "geom", childclass)
+            found = self._shape(geom)
+            if found is None:
+                continue
+            shape, at = found
+            seen = geom.get("contype") == "0" and geom.get("conaffinity") == "0"
+            made = SubElement(link, "visual" if seen else "collision")
+            SubElement(made, "origin", xyz=_text(at.p), rpy=_text(pin.rpy.matrixToRpy(at.R)))
+            SubElement(made, "geometry").append(shape)
+            if shape.tag == "sphere" and not seen:
+                spheres.append((geom.get("name") or f"{link.get('name')}_sphere", at))
+        if len(spheres) == 1:
+            (name, at), *_ = spheres
+            self.spheres.append((name, link.get("name", ""), at))
+
+    def _shape(self, geom: Element) -> tuple[Element, _Pose] | None:
+        """A geom as an element of <geometry>, and its place; None if a URDF has none for it."""
+        kind = geom.get("type", "sphere")
+        if kind == "mesh":
+            mesh = self.meshes.get(geom.get("mesh", ""))
+            if mesh is None:
+                return None
+            folder = self.compiler.get("meshdir") or self.compiler.get("assetdir") or "."
+            file, scale = str(Path(folder) / mesh.get("file", "")), mesh.get("scale", "1 1 1")
+            return Element("mesh", filename=file, scale=scale), self._pose(geom)
+        at, size = None, [number(word) for word in geom.get("size", "").split()]
+        if "fromto" in geom.attrib:
+            start, end = np.split(self._vector(geom, "fromto", 6, ""), 2)
+            along = Element("frame", zaxis=_text(end - start))
+            at = _Pose(self._rotation(along), (start + end) / 2.0)
+            size[1:] = [float(np.linalg.norm(end - start)) / 2.0]
+        needed = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}.get(kind, 0)
+        size = size[:needed]
+        if not needed or len(size) < needed or not np.isfinite(size).all():
+            return None
+        if kind == "box":
+            shape = Element("box", size=_text(2.0 * np.array(size)))
+        else:
+            shape = Element(kind, radius=repr(size[0]))
+            if needed == 2:
+                shape.set("length", repr(2.0 * size[1]))
+        return shape, self._pose(geom) if at is None else at
 
     def _has_mass(self, geom: Element, childclass: str) -> bool:
         whole = self._with_defaults(geom, "geom", childclass)
