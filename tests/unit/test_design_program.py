@@ -124,3 +124,34 @@ def test_a_file_that_is_no_program_is_named(tmp_path, program, keys, words):
 def test_a_program_that_cannot_be_frozen_is_told_why(tmp_path, program, words):
     with pytest.raises(InputError, match=words):
         load(project(tmp_path, program)).local_margins()
+
+
+@pytest.mark.parametrize("ask", ["local_margins", "simulate"])
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("raise KeyError('knee')", "tick in .*mine.py raises KeyError: 'knee'"),
+        ("raise SystemExit(0)", "tick in .*mine.py raises SystemExit: 0"),
+        ("out[:] = measurement.rates", "mine.py raises AttributeError"),
+    ],
+)
+def test_what_a_tick_raises_is_the_program_s(tmp_path, ask, line, words):
+    """It is wrong input, not a failure of the tool, and never a silent end."""
+    system = load(
+        project(tmp_path, ARM.replace("out[:] = {kp}", f"{line}\n        out[:] = {{kp}}"))
+    )
+    with pytest.raises(InputError, match=words):
+        getattr(system, ask)()
+
+
+def test_a_file_that_leaves_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"mine\.py raises SystemExit"):
+        load(project(tmp_path, "import sys\nsys.exit()"))
+
+
+def test_what_else_a_controller_states_is_asked_of_it(tmp_path):
+    """The simulator asks for a storage, `freeze` for a state space."""
+    stated = ARM.replace("self.gravity =", "self.storage = self.gravity =", 1)
+    controller = load(project(tmp_path, stated)).controller()
+    np.testing.assert_array_equal(controller.storage, controller.gravity)
+    assert not hasattr(controller, "tank_energy")

@@ -319,11 +319,12 @@ def _require_balance(
         raise InputError(
             f"The controller does not hold the state: at joint {robot.joints[worst]} the spring "
             f"carries {rest.tau_sea[worst]:.4g} Nm and the command is {command[worst]:.4g} Nm. "
-            "Give the q and theta at which it rests."
+            "Let it command what holds gravity there, or give the q and theta at which it rests."
         )
     links = float(np.abs(left).max(initial=0.0))
     if links > _BALANCED * scale:
         raise InputError(
             f"The controller does not hold the state: {links:.4g} (N, Nm) of gravity is left that "
-            "neither springs nor contacts carry. Give the q and theta at which it rests."
+            "neither springs nor contacts carry. Let it command what holds gravity there, or give "
+            "the q and theta at which it rests."
         )
