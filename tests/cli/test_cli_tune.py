@@ -66,6 +66,21 @@ def test_an_answer_in_words(copy, cli):
     assert "certified" in text
 
 
+@pytest.mark.parametrize(
+    ("number", "words"), [("constant", "every constant delay"), ("jitter", "varies as it likes")]
+)
+def test_what_a_number_promises_stands_beside_the_certificate(number, words, tmp_path, cli):
+    """Damping in the controller has no certificate, and is found all the same."""
+    text = GO2.read_text().replace('damping_at = "drive" ', 'damping_at = "controller" ')
+    text = text.replace("sample_time_ms = 2.0", "sample_time_ms = 0.2")
+    project = tmp_path / "go2.toml"
+    project.write_text(text.replace("value_ms = 5.0", "value_ms = 0.2"))
+    code, text, _ = cli("tune", project, "--aim", "bandwidth=20", "--number", number)
+    assert code == 0
+    assert words in text
+    assert "not certified (of the passive number, not asked for)" in text
+
+
 def test_a_file_beside_the_project(copy, cli, tmp_path):
     project, other = copy(GO2), tmp_path / "stiff.toml"
     before = project.read_bytes()
