@@ -173,6 +173,31 @@ def test_dotted_keys_that_leave_no_place_are_named(tmp_path, cli):
     assert project.read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    "actuators",
+    [
+        "[actuators]\ndefault = {{ {keys} }} # all\n"
+        "joint = {{ LF_HAA = {{ motor_damping = 9.0 }} }}\n",
+        "actuators = {{ default = {{ {keys} }} }} # all\n",
+        "[actuators]\ndefault = {{ {keys} }} # all\n"
+        "[actuators.joint.LF_HAA]\nmotor_damping = 9.0\n",
+    ],
+    ids=["a table of joints", "a table of all", "joints below"],
+)
+def test_inline_tables_of_actuators_take_the_damping(actuators, tmp_path, cli):
+    text = ANYMAL.read_text()
+    section = text[text.index("[actuators.default]") : text.index("[[contacts]]")]
+    keys = ", ".join(line.split("#")[0].strip() for line in section.splitlines()[1:] if line)
+    project = tmp_path / "inline.toml"
+    project.write_text(actuators.format(keys=keys) + text.replace(section, ""))
+    code, out, err = cli("tune", project, "--aim", "damping", "--write", project, "--json")
+    assert (code, err) == (0, "")
+    after = tomllib.loads(project.read_text())["actuators"]
+    found = {name: entry["motor_damping"] for name, entry in after["joint"].items()}
+    assert found == json.loads(out)["D_theta"]
+    assert "# all" in project.read_text()
+
+
 def test_windows_line_ends_and_a_table_of_gains_stay(tmp_path, cli):
     legs = [
         f"{leg}_{part}_joint"
