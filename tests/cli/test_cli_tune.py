@@ -66,6 +66,21 @@ def test_an_answer_in_words(copy, cli):
     assert "certified" in text
 
 
+@pytest.mark.parametrize(
+    ("number", "words"), [("constant", "every constant delay"), ("jitter", "varies as it likes")]
+)
+def test_what_a_number_promises_stands_beside_the_certificate(number, words, tmp_path, cli):
+    """Damping in the controller has no certificate, and is found all the same."""
+    text = GO2.read_text().replace('damping_at = "drive" ', 'damping_at = "controller" ')
+    text = text.replace("sample_time_ms = 2.0", "sample_time_ms = 0.2")
+    project = tmp_path / "go2.toml"
+    project.write_text(text.replace("value_ms = 5.0", "value_ms = 0.2"))
+    code, text, _ = cli("tune", project, "--aim", "bandwidth=20", "--number", number)
+    assert code == 0
+    assert words in text
+    assert "not certified (of the passive number, not asked for)" in text
+
+
 def test_a_file_beside_the_project(copy, cli, tmp_path):
     project, other = copy(GO2), tmp_path / "stiff.toml"
     before = project.read_bytes()
@@ -156,6 +171,31 @@ def test_dotted_keys_that_leave_no_place_are_named(tmp_path, cli):
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "dotted" in err
     assert project.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "actuators",
+    [
+        "[actuators]\ndefault = {{ {keys} }} # all\n"
+        "joint = {{ LF_HAA = {{ motor_damping = 9.0 }} }}\n",
+        "actuators = {{ default = {{ {keys} }} }} # all\n",
+        "[actuators]\ndefault = {{ {keys} }} # all\n"
+        "[actuators.joint.LF_HAA]\nmotor_damping = 9.0\n",
+    ],
+    ids=["a table of joints", "a table of all", "joints below"],
+)
+def test_inline_tables_of_actuators_take_the_damping(actuators, tmp_path, cli):
+    text = ANYMAL.read_text()
+    section = text[text.index("[actuators.default]") : text.index("[[contacts]]")]
+    keys = ", ".join(line.split("#")[0].strip() for line in section.splitlines()[1:] if line)
+    project = tmp_path / "inline.toml"
+    project.write_text(actuators.format(keys=keys) + text.replace(section, ""))
+    code, out, err = cli("tune", project, "--aim", "damping", "--write", project, "--json")
+    assert (code, err) == (0, "")
+    after = tomllib.loads(project.read_text())["actuators"]
+    found = {name: entry["motor_damping"] for name, entry in after["joint"].items()}
+    assert found == json.loads(out)["D_theta"]
+    assert "# all" in project.read_text()
 
 
 def test_windows_line_ends_and_a_table_of_gains_stay(tmp_path, cli):

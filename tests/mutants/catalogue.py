@@ -62,6 +62,8 @@ TESTS = {
     "export": "tests/unit/test_report_mujoco.py tests/oracle/test_export_mujoco.py",
     "cli": "tests/cli/test_cli_terminal.py tests/cli/test_cli_status.py "
            "tests/cli/test_cli_certify.py tests/cli/test_cli_simulate.py",
+    "tune": "tests/unit/test_tune_limits.py tests/unit/test_tune_margins.py "
+            "tests/unit/test_tune_motion.py tests/cli/test_cli_tune.py",
     "units": "tests/unit/test_units.py tests/unit/test_design_starter.py",
 }  # fmt: skip
 """Tests of each room, those that are quick first."""
@@ -727,5 +729,58 @@ MUTANTS = [
          "if value_s > 1e3 * LONGEST_DELAY_S:\n        raise",
          "milliseconds taken for seconds"),
         ("return value_ms * 1e-3", "return value_ms * 1e-6", "milliseconds"),
+    ),
+    *_of(
+        "tune", "tune/_passive.py",
+        ("series = system.law.signal.limits(drives.spring_stiffness, delay / D)",
+         "series = system.law.signal.limits(drives.spring_stiffness, delay / D / 1.001)",
+         "stiffness above the delay's limit"),
+        ("return Limits(parts=self._parts, held=self._held, series=series)",
+         "return Limits(parts=self._parts, held=-self._held, series=series)",
+         "gravity compensation with the wrong sign"),
+        ("cost = np.maximum(cost, _AT_REST * cost.mean())", "cost = np.ones_like(cost)",
+         "drag that is a trace"),
+    ),
+    *_of(
+        "tune", "tune/_gains.py",
+        ("_DECIMAL = Context(prec=DIGITS, rounding=ROUND_FLOOR)",
+         "_DECIMAL = Context(prec=4, rounding=ROUND_FLOOR)", "gains that give digits away"),
+        ("task if np.ndim(task.stiffness) == 2 else replace",
+         "replace", "singular matrices of gains rounded to indefinite ones"),
+        ("scale = scale[np.diag(gains) > 0.0]", "scale = scale[:]",
+         "a matrix with a direction without gain refused"),
+    ),
+    *_of(
+        "tune", "tune/_tune.py",
+        ("required=safety * system.delays.d_1", "required=system.delays.d_1",
+         "a safety factor that is left out"),
+        ("less, low=_BELOW, high=_SCALES[1])", "less, low=1.0, high=_SCALES[1])",
+         "no damping found where the jitter margin is the passive bound"),
+        ("high = max(high, low * _SCALES[1])", "high = _SCALES[1]",
+         "no stiffness found for soft gains"),
+    ),
+    *_of(
+        "tune", "tune/_answer.py",
+        ("reached >= question.required and not reasons", "reached >= question.required",
+         "found, but not certified"),
+        ("if _unstable(question, system):", "if False:",
+         "minutes spent on loops that grow without delay"),
+    ),
+    *_of(
+        "tune", "tune/_joint_pd.py",
+        ("return most + system.actuators.shaped_inertia", "return most",
+         "bandwidth without the motors' inertia"),
+        ("wanted = 2.0 * damping_ratio * bandwidth * inertia",
+         "wanted = damping_ratio * bandwidth * inertia", "half the damping ratio"),
+    ),
+    *_of(
+        "tune", "tune/_write.py",
+        ("if isinstance(parent, InlineTable):", "if False:",
+         "inline tables of actuators that end in a failure"),
+    ),
+    *_of(
+        "tune", "tune/_limits.py",
+        ("both = np.concatenate([F, -F]) if np.linalg.eigvalsh(F).min() < 0.0 else F",
+         "both = F", "damping for one sign of the stiffness only"),
     ),
 ]  # fmt: skip

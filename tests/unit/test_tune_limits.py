@@ -206,3 +206,22 @@ def test_safety_and_delay_multiply(tmp_path):
     assert one.limit == pytest.approx(other.limit, rel=1e-9)
     assert one.limit == pytest.approx(1.05 / (1.2 * 0.007) / 40.0, rel=1e-9)
     assert one.reached_s >= 1.2 * system.delays.d_1
+
+
+@pytest.mark.parametrize(
+    "K_x",
+    [np.outer([1.0, -3.3], [1.0, -3.3]), np.diag([30.0, 0.0]), np.outer([0.7, 0.3], [0.7, 0.3])],
+    ids=["singular", "a direction without gain", "singular too"],
+)
+@pytest.mark.parametrize("share", ["common", "task"])
+def test_a_singular_matrix_of_gains_stays_one(tmp_path, K_x, share):
+    """s K_x ≼ D/d: s = 1/(d kᵀ D⁻¹ k) of K_x = k kᵀ; no rounding makes it indefinite."""
+    robot = arm_system(tmp_path).robot
+    law = Law(tasks=(joint_task(robot, K_x),), stiffness_form="force", gravity="planned")
+    posture = np.array([np.pi / 2, 0.0])
+    tuned = tune(arm_system(tmp_path, robot=robot, law=law, posture=posture), share=share)
+    d = tuned.question.required
+    scale = 1.0 / (d * np.trace(K_x @ np.diag([1.0 / 12.0, 1.0 / 5.0])))
+    assert tuned.limit == pytest.approx(scale, rel=1e-9)
+    np.testing.assert_allclose(tuned.system.law.tasks[0].stiffness, scale * K_x, rtol=2e-6)
+    assert tuned.found

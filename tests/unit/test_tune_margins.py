@@ -14,10 +14,10 @@ from sealag.whole_body import Law
 GO2 = EXAMPLES / "go2.toml"
 
 
-def one_joint(folder, **changes):
+def one_joint(folder, stiffness=30.0, **changes):
     """One joint that hangs, its stiffness fed back from the motor."""
     robot = arm_system(folder, count=1).robot
-    law = Law(tasks=(joint_task(robot, 30.0),), stiffness_form="force", gravity="planned")
+    law = Law(tasks=(joint_task(robot, stiffness),), stiffness_form="force", gravity="planned")
     posture = np.array([np.pi / 2])
     delays = constant_delays(5e-3, 5e-3, sample_time=1e-3)
     return arm_system(
@@ -41,6 +41,40 @@ def test_a_margin_ends_at_its_first_crossing(tmp_path, number):
     assert margin(1.0) >= system.delays.d_1
     assert margin(1.001) < system.delays.d_1
     assert margin(0.3) >= system.delays.d_1
+
+
+@pytest.mark.parametrize("number", ["jitter", "constant"])
+def test_the_search_begins_where_passivity_ends_however_soft_the_gain(tmp_path, number):
+    """What is found is a stiffness, whatever the factor from where it was."""
+    soft, usual = (tune(one_joint(tmp_path, k), number=number) for k in (1e-4, 30.0))
+    assert soft.found
+    assert 1e-4 * soft.scale == pytest.approx(30.0 * usual.scale, rel=1e-4)
+
+
+def test_a_joint_whose_jitter_margin_is_its_passive_bound_has_a_least_damping(tmp_path):
+    """Both are alike to rounding, so that the passive damping itself may just not hold."""
+    system = one_joint(tmp_path)
+    passive, jitter = (tune(system, aim="damping", number=name) for name in ("passive", "jitter"))
+    assert jitter.found
+    D = [one.system.actuators.motor_damping[0] for one in (passive, jitter)]
+    assert D[1] == pytest.approx(D[0], rel=2e-5)
+
+
+def test_a_loop_that_is_unstable_without_delay_is_left_at_once(tmp_path, monkeypatch):
+    """An upright link under its own weight falls with soft gains: no margin is searched there."""
+    upright = replace(one_joint(tmp_path, 0.5), posture=np.array([-np.pi / 2]))
+    searched = []
+    local = type(upright).local
+
+    def counted(system, *arguments, **choices):
+        found = local(system, *arguments, **choices)
+        searched.append(found.unstable_modes)
+        return found
+
+    monkeypatch.setattr(type(upright), "local", counted)
+    assert tune(upright, number="constant").found
+    assert searched
+    assert not any(searched)
 
 
 def test_less_damping_than_passivity_needs_is_enough_for_a_constant_delay(tmp_path):

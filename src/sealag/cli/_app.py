@@ -224,7 +224,7 @@ def tune(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Find gains for a delay and what stops them; status 1 if none are certified."""
+    """Find gains for a delay and what stops them; status 1 if there are none."""
     from sealag.cli._tune import tune_project
 
     raise typer.Exit(

@@ -14,6 +14,12 @@ from sealag.tune import tune
 from sealag.units import number_of, seconds_from_ms, time_text
 
 _SHARES_SHOWN = 3
+_PROMISES = {
+    "passive": "any passive robot and environment, every delay up to it",
+    "jitter": "this robot beside its rest, every delay up to it that varies as it likes",
+    "constant": "this robot beside its rest, every constant delay up to it; no jitter, no hold",
+}
+"""What holds for gains that reach the required delay by a number."""
 
 
 def tune_project(
@@ -101,8 +107,12 @@ def _show(tuned: Any, path: Path | None) -> None:
         rows += [(f"  factor of {name}", f"{value:.6g}") for name, value in tuned.factors.items()]
     if binding is not None:
         rows += [(name, _gain(value)) for name, value in tuned.gains().items()]
+    if tuned.found:
+        rows.append(("promised", _PROMISES[question.number]))
     if tuned.certificate is not None:
-        rows.append(("certificate", tuned.certificate.answer.status.value.replace("_", " ")))
+        status = tuned.certificate.answer.status.value.replace("_", " ")
+        asked = "" if question.number == "passive" else " (of the passive number, not asked for)"
+        rows.append(("certificate", status + asked))
     if binding is not None:
         shares = sorted(binding.joints.items(), key=lambda item: -item[1])[:_SHARES_SHOWN]
         joints = ", ".join(f"{name} {share:.0%}" for name, share in shares if share >= 0.01)

@@ -91,6 +91,7 @@ def stiffened(system: System, groups: Sequence[Group], factors: Array) -> System
         elif gains.ndim < 2:
             gains = gains * scale
         else:
+            scale = scale[np.diag(gains) > 0.0]  # the other rows are 0
             if np.ptp(scale) > 0.0:
                 raise InputError(
                     f"Task {task.name} has a full matrix of gains, which has no directions of its "
@@ -122,6 +123,8 @@ def parts_of(system: System, groups: Sequence[Group], motion: Motion | None) -> 
 def rounded(system: System, *, up: bool = False) -> System:
     """Return a design whose gains have few digits, none larger than before.
 
+    Full matrices stay: no project file holds them, and rounding would make them indefinite.
+
     Args:
         system: the design.
         up: instead of its stiffness, round its motor damping, and up.
@@ -129,7 +132,10 @@ def rounded(system: System, *, up: bool = False) -> System:
     if up:
         damping = _floor(-system.actuators.motor_damping)
         return replace(system, actuators=replace(system.actuators, motor_damping=-damping))
-    tasks = (replace(task, stiffness=_floor(task.stiffness)) for task in system.law.tasks)
+    tasks = (
+        task if np.ndim(task.stiffness) == 2 else replace(task, stiffness=_floor(task.stiffness))
+        for task in system.law.tasks
+    )
     return replace(system, law=replace(system.law, tasks=tuple(tasks)))
 
 

@@ -188,7 +188,7 @@ def _least_damping(question: Question) -> Tuned:
         damping = np.maximum(drives.motor_damping / factor, floor)
         return rounded(replace(design, actuators=replace(drives, motor_damping=damping)), up=True)
 
-    return _searched(question, less, low=1.0, high=_SCALES[1])
+    return _searched(question, less, low=_BELOW, high=_SCALES[1])
 
 
 def _stiffest_by_margin(question: Question) -> Tuned:
@@ -200,6 +200,7 @@ def _stiffest_by_margin(question: Question) -> Tuned:
     passive, _ = knobs.stiffest(question.required * (1.0 + EASE))
     if passive_bound(question, design(passive)) >= question.required:
         low = _BELOW * float(passive[0])
+        high = max(high, low * _SCALES[1])
     return _searched(question, lambda factor: design(np.array([factor])), low=low, high=high)
 
 

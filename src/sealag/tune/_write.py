@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import tomlkit
+from tomlkit.items import InlineTable
 
 from sealag.design import System, load
 from sealag.errors import InputError
@@ -131,17 +132,24 @@ def _put_each(table: Any, key: str, names: Sequence[str], values: Array) -> None
         table[key] = each
 
 
+def _new_table(parent: Any, **kind: bool) -> Any:
+    """An empty table of the only kind that its parent can hold."""
+    if isinstance(parent, InlineTable):
+        return tomlkit.inline_table()
+    return tomlkit.table(**kind)
+
+
 def _put_damping(document: Any, before: System, after: System) -> None:
     """Write motor damping where it differs from what stands there."""
     old, new = before.actuators.motor_damping, after.actuators.motor_damping
     actuators = document["actuators"]
     if "joint" not in actuators:
-        actuators["joint"] = tomlkit.table(is_super_table=True)
+        actuators["joint"] = _new_table(actuators, is_super_table=True)
     for name, was, value in zip(after.robot.joints, old.tolist(), new.tolist()):
         if was == value:
             continue
         if name not in actuators["joint"]:
-            actuators["joint"][name] = tomlkit.table()
+            actuators["joint"][name] = _new_table(actuators["joint"])
         table = actuators["joint"][name]
         table["motor_damping"] = value
     if not actuators["joint"]:
