@@ -10,6 +10,7 @@ from sealag.design import System, certify
 from sealag.errors import ContractionError, SolverError
 from sealag.passivity import Certificate, Criterion, Status
 from sealag.tune._question import Number, Question, pd_keys
+from sealag.tune._room import transparency_of
 from sealag.tune._write import as_file, kd_of_file
 from sealag.units import time_text
 
@@ -19,7 +20,8 @@ class Binding:
     """What stops a gain.
 
     Attributes:
-        kind: "delay"; "spring" where the springs have more of the limiting compliance; "stability"
+        kind: "delay"; "transparency" where its limit keeps damping away that the delay asks for;
+            "spring" where the springs have more of the limiting compliance; "stability"
             where the loop loses its stability before its passivity, or even without delay.
         instant: index of the instant.
         time_s: its time, s.
@@ -161,6 +163,8 @@ class Tuned:
             "bandwidth_rad_s": self.bandwidth_rad_s,
             "factors": dict(self.factors),
             **self.gains(),
+            "limits": dict(asked.limits),
+            "transparency": transparency_of(asked, self.system),
             "binding": None if self.binding is None else asdict(self.binding),
             "certificate": None if certificate is None else certificate.summary(),
             "reasons": list(self.reasons),
