@@ -197,9 +197,10 @@ def _least_damping(question: Question) -> Tuned:
         return Tuned.none(question, closed_text(question, room))
     at_limit = damped(question, question.required, room)
     eased = damped(question, question.required * (1.0 + EASE), room)
-    for found in (at_limit, eased):
-        if isinstance(found, str):
-            return Tuned.none(question, found)
+    if isinstance(at_limit, str):
+        return Tuned.none(question, at_limit)
+    if isinstance(eased, str):
+        return Tuned.none(question, eased)
     (_, cost), (design, _) = at_limit, eased
     if question.number is Number.PASSIVE:
         held = (design.actuators.motor_damping >= room.most * (1.0 - EASE)).any()
