@@ -203,7 +203,7 @@ def tune(
             "--aim",
             help="stiffness: the largest; bandwidth: the largest of joint PD, or bandwidth=30 "
             "(rad/s), also with ,damping-ratio=0.7; damping: the least of the motors; drag: the "
-            "least along the motion.",
+            "least along the motion; shaping: the least beta for the embedded period.",
         ),
     ] = "stiffness",
     limit: Annotated[
@@ -211,7 +211,8 @@ def tune(
         typer.Option(
             "--limit",
             help="Transparency to keep: bandwidth=8Hz, the least of the locked joints; rms=5Nm, "
-            "the largest of torque against command along the motion. May be repeated.",
+            "the largest of torque against command along the motion; noise=10, the "
+            "largest gain of torque noise by shaping. May be repeated.",
         ),
     ] = None,
     number: Annotated[

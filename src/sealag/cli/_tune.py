@@ -16,7 +16,7 @@ from sealag.units import number_of, seconds_from_ms, time_text
 _SHARES_SHOWN = 3
 _GOALS = {"bandwidth": "bandwidth", "damping-ratio": "damping_ratio"}
 """Names in --aim, and what `tune` calls them."""
-_UNITS = {"bandwidth": "Hz", "rms": "Nm"}
+_UNITS = {"bandwidth": "Hz", "rms": "Nm", "noise": ""}
 """Unit of each limit."""
 
 
@@ -69,7 +69,8 @@ def _aim(aim: str) -> tuple[str, dict[str, float]]:
         return word, {}
     if word != "bandwidth" or not set(goals) <= set(_GOALS.values()) or None in goals.values():
         raise InputError(
-            f"--aim is {aim!r}; it must be stiffness, damping, drag, bandwidth or bandwidth=NUMBER "
+            f"--aim is {aim!r}; it must be one of stiffness, damping, drag, shaping, bandwidth or "
+            "bandwidth=NUMBER "
             "(rad/s); damping-ratio=NUMBER may follow bandwidth behind a comma."
         )
     return word, {name: value for name, value in goals.items() if value is not None}
@@ -81,7 +82,8 @@ def _limit(text: str) -> tuple[str, float]:
     value = number_of(number.removesuffix(_UNITS.get(name, "")).strip())
     if name not in _UNITS or value is None:
         raise InputError(
-            f"--limit is {text!r}; it must be bandwidth=NUMBER (Hz) or rms=NUMBER (Nm)."
+            f"--limit is {text!r}; it must be bandwidth=NUMBER (Hz), rms=NUMBER (Nm) or "
+            "noise=NUMBER."
         )
     return name, value
 
@@ -150,6 +152,8 @@ def _transparency(tuned: Any) -> list[tuple[str, str]]:
     shown = tuned.summary()["transparency"]
     rows = []
     for name, limit in tuned.question.limits.items():
+        if name == "noise":  # its gain follows from the shaping
+            continue
         unit, least = _UNITS[name], name == "bandwidth"
         values = shown[f"{name}_{unit.lower()}"]
         joint = (min if least else max)(values, key=values.get)

@@ -9,7 +9,7 @@ import numpy as np
 from sealag.design import System, certify
 from sealag.errors import ContractionError, SolverError
 from sealag.passivity import Certificate, Criterion, Status
-from sealag.tune._question import Number, Question, pd_keys
+from sealag.tune._question import Aim, Number, Question, pd_keys
 from sealag.tune._room import transparency_of
 from sealag.tune._write import as_file, kd_of_file
 from sealag.units import time_text
@@ -21,8 +21,9 @@ class Binding:
 
     Attributes:
         kind: "delay"; "transparency" where its limit keeps damping away that the delay asks for;
-            "spring" where the springs have more of the limiting compliance; "stability"
-            where the loop loses its stability before its passivity, or even without delay.
+            "period" or "noise" where it bounds the shaping; "spring" where the springs have more of
+            the limiting compliance; "stability" where the loop loses its stability before its
+            passivity, or even without delay.
         instant: index of the instant.
         time_s: its time, s.
         joint: the joint with the largest share in the limiting motion.
@@ -145,6 +146,10 @@ class Tuned:
         else:
             found["K_x"] = {task.name: np.asarray(task.stiffness).tolist() for task in law.tasks}
         found["D_theta"] = dict(zip(joints, self.system.actuators.motor_damping.tolist()))
+        if self.question.aim is Aim.SHAPING:
+            found["inertia_shaping"] = dict(
+                zip(joints, self.system.actuators.inertia_shaping.tolist())
+            )
         return found
 
     def summary(self) -> dict[str, Any]:

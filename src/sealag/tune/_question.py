@@ -22,6 +22,7 @@ class Aim(StrEnum):
     BANDWIDTH = "bandwidth"
     DAMPING = "damping"
     DRAG = "drag"
+    SHAPING = "shaping"
 
 
 class Limit(StrEnum):
@@ -29,6 +30,7 @@ class Limit(StrEnum):
 
     BANDWIDTH = "bandwidth"
     RMS = "rms"
+    NOISE = "noise"
 
 
 class Number(StrEnum):
@@ -61,7 +63,7 @@ class Question:
         bandwidth: of joint PD, rad/s; None for the largest.
         damping_ratio: of joint PD.
         limits: of transparency: least bandwidth of the locked joints, Hz; largest RMS of Γ_sea
-            against its command along the motion, Nm.
+            against its command along the motion, Nm; of shaping: largest gain of torque noise.
     """
 
     system: System
@@ -105,13 +107,27 @@ class Question:
                 f"{self.system.name} has no joint PD whose bandwidth could be set "
                 '(controller.kind = "joint_pd"); maximize stiffness.'
             )
-        if self.limits:
+        if self.aim is Aim.SHAPING or Limit.NOISE in self.limits:
+            self._check_shaping()
+        elif self.limits:
             self._check_limits()
 
     @property
     def moves(self) -> bool:
         """Whether it has a motion of two instants and more, of which there are means."""
         return self.motion is not None and len(self.motion) > 1
+
+    def _check_shaping(self) -> None:
+        """Refuse shaping without a period, and limits that are not its own."""
+        if self.aim is not Aim.SHAPING or set(self.limits) - {Limit.NOISE}:
+            raise InputError(
+                "The limit noise is for shaping (--aim shaping), and the only one that it takes."
+            )
+        if not self.system.delays.embedded_period > 0.0:
+            raise InputError(
+                f"{self.system.name} states no period of its drives' loop, which bounds the "
+                "shaping; give embedded_period_ms in [delays]."
+            )
 
     def _check_limits(self) -> None:
         """Refuse limits that nothing keeps, or whose closed forms do not hold."""

@@ -16,6 +16,7 @@ from sealag.tune._passive import EASE, Knobs, damped
 from sealag.tune._question import LARGEST_SAFETY, Aim, Limit, Number, Question, Share
 from sealag.tune._room import closed_text, least_of, room_of
 from sealag.tune._search import first_crossing
+from sealag.tune._shaping import least_shaping
 from sealag.typing import Array
 from sealag.units import check_delay_s, time_text
 
@@ -55,7 +56,7 @@ def tune(
         motion: its instants; the posture if None.
         aim: stiffness, the largest K_x or K_p; bandwidth, the largest ω of joint PD, or what a
             given one tolerates; damping, the least trace D_θ; drag, the least energy that D_θ takes
-            along the motion.
+            along the motion; shaping, the least β that loop rate and torque noise allow.
         number: the delay that must reach the required one: passive (closed form or a convex
             program, certified), jitter or constant (the first crossing from small gains up).
         share: what has a factor of its own: common (all tasks), task, or direction (of joint PD:
@@ -67,7 +68,8 @@ def tune(
         damping_ratio: ζ of joint PD.
         limits: of transparency, for stiffness, damping and drag: bandwidth, the least of the locked
             joints, Hz; rms, the largest of Γ_sea against its command along the motion, Nm. For the
-            largest stiffness motor damping is set to the most that they leave.
+            largest stiffness motor damping is set to the most that they leave. For shaping: noise,
+            the largest gain |B / B_s − 1| of torque noise.
 
     Returns:
         The gains, or why there are none; no gain is a result, not an error.
@@ -96,6 +98,8 @@ def tune(
     )
     if question.aim is Aim.BANDWIDTH:
         return _bandwidth(question)
+    if question.aim is Aim.SHAPING:
+        return least_shaping(question)
     if question.aim is not Aim.STIFFNESS:
         return _least_damping(question)
     if question.number is Number.PASSIVE:
