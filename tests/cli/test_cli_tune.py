@@ -35,7 +35,9 @@ def copy(tmp_path):
         (ANYMAL, ["--aim", "damping"]),
         (GO2, ["--aim", "damping"]),
         (GO2, ["--share", "direction"]),
-        (GO2, ["--aim", "bandwidth", "--damping-ratio", "0.7"]),
+        (GO2, ["--limit", "bandwidth=4Hz"]),
+        (ANYMAL, ["--aim", "damping", "--limit", "bandwidth=19Hz"]),
+        (GO2, ["--aim", "bandwidth,damping-ratio=0.7"]),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
@@ -81,6 +83,16 @@ def test_what_a_number_promises_stands_beside_the_certificate(number, words, tmp
     assert "not certified (of the passive number, not asked for)" in text
 
 
+def test_a_limit_in_words(cli):
+    code, text, err = cli("tune", ANYMAL, "--aim", "damping", "--limit", "bandwidth=20.5Hz")
+    assert (code, err) == (1, "")
+    assert "the limit bandwidth 20.5 Hz leaves" in text
+    code, text, err = cli("tune", ANYMAL, "--limit", "bandwidth=2Hz")
+    assert (code, err) == (0, "")
+    assert "bandwidth of the torque    2 Hz at " in text
+    assert "(limit 2 Hz)" in text
+
+
 def test_a_file_beside_the_project(copy, cli, tmp_path):
     project, other = copy(GO2), tmp_path / "stiff.toml"
     before = project.read_bytes()
@@ -113,7 +125,18 @@ def test_no_gain_is_a_no(copy, cli):
         (["--share", "joint"], "'joint'"),
         (["--safety", "0.5"], "safety is 0.5"),
         (["--safety", "nan"], "safety is nan"),
-        (["--damping-ratio", "-1"], "damping_ratio is -1"),
+        (["--aim", "bandwidth,damping-ratio=-1"], "damping_ratio is -1"),
+        (["--aim", "bandwidth,speed=3"], "bandwidth=NUMBER"),
+        (["--aim", "damping,damping-ratio=1"], "bandwidth=NUMBER"),
+        (["--limit", "bandwidth=fast"], "bandwidth=NUMBER (Hz)"),
+        (["--limit", "bandwidth=3Nm"], "bandwidth=NUMBER (Hz)"),
+        (["--aim", "shaping"], "embedded_period_ms"),
+        (["--aim", "shaping", "--limit", "bandwidth=3"], "noise is for shaping"),
+        (["--limit", "noise=3"], "noise is for shaping"),
+        (["--limit", "3"], "bandwidth=NUMBER (Hz)"),
+        (["--limit", "rms=1Nm"], "--motion"),
+        (["--limit", "bandwidth=1", "--limit", "bandwidth=2Hz"], "twice"),
+        (["--limit", "bandwidth=1", "--number", "jitter"], "passive"),
         (["--delay-ms", "1"], "2.000 ms"),
         (["--delay-ms", "-1"], "delay"),
         (["--delay-ms", "nan"], "delay"),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple, Required, Self, TypedDict, Unpack,
 
 import numpy as np
 
-from sealag.actuation._transparency import Transparency, locked_joints
+from sealag.actuation._transparency import Transparency, locked_joints, most_damping
 from sealag.errors import InputError, near
 from sealag.robot import Robot
 from sealag.typing import Array, ArrayLike
@@ -218,6 +218,16 @@ class Actuators:
         return locked_joints(
             self.spring_stiffness, self.shaped_inertia, self.motor_damping, delay=delay
         )
+
+    def most_damping(self, bandwidth: float) -> Array:
+        """Return the largest D_θ that leaves the locked joints a bandwidth, (n,) Nms/rad.
+
+        NaN where the undamped joint is slower (docs/theory section 9).
+
+        Args:
+            bandwidth: Hz, positive.
+        """
+        return most_damping(self.spring_stiffness, self.shaped_inertia, bandwidth=bandwidth)
 
 
 def _joint_values(joints: Sequence[str], values: ArrayLike, *, name: str, allowed: _Range) -> Array:

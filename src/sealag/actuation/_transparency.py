@@ -44,3 +44,20 @@ def locked_joints(K: Array, B_s: Array, D: Array, *, delay: float = 0.0) -> Tran
         damping_ratio=D / (2.0 * np.sqrt(K * B_s)),
         phase_lag=-np.unwrap(np.angle(transfer), axis=0)[1],
     )
+
+
+def most_damping(K: Array, B_s: Array, *, bandwidth: float) -> Array:
+    """Return the motor damping at which the locked joints have a bandwidth, (n,) Nms/rad.
+
+    D² ω² = 2 K² − (K − B_s ω²)²: amplitudes that pass −3 dB once have at least that bandwidth
+    while D is not larger. NaN where the undamped joint is slower.
+
+    Args:
+        K: (n,) spring stiffness, Nm/rad.
+        B_s: (n,) shaped inertia, kg m².
+        bandwidth: Hz, positive.
+    """
+    omega = 2.0 * np.pi * bandwidth
+    x = B_s * omega**2 / K
+    room = (np.sqrt(2.0) - 1.0 + x) * (np.sqrt(2.0) + 1.0 - x)  # does not cancel at small x
+    return K / omega * np.sqrt(np.where(room >= 0.0, room, np.nan))

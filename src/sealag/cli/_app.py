@@ -202,9 +202,19 @@ def tune(
         typer.Option(
             "--aim",
             help="stiffness: the largest; bandwidth: the largest of joint PD, or bandwidth=30 "
-            "(rad/s); damping: the least of the motors; drag: the least along the motion.",
+            "(rad/s), also with ,damping-ratio=0.7; damping: the least of the motors; drag: the "
+            "least along the motion; shaping: the least beta for the embedded period.",
         ),
     ] = "stiffness",
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            help="Transparency to keep: bandwidth=8Hz, the least of the locked joints; rms=5Nm, "
+            "the largest of torque against command along the motion; noise=10, the "
+            "largest gain of torque noise by shaping. May be repeated.",
+        ),
+    ] = None,
     number: Annotated[
         str, typer.Option("--number", help="Delay that counts: passive, jitter or constant.")
     ] = "passive",
@@ -215,9 +225,6 @@ def tune(
         float | None, typer.Option("--delay-ms", help="Delay. Default: the design's own.")
     ] = None,
     safety: Annotated[float, typer.Option("--safety", help="Factor on the delay.")] = 1.0,
-    damping_ratio: Annotated[
-        float, typer.Option("--damping-ratio", help="Of joint PD, for its bandwidth.")
-    ] = 1.0,
     write: Annotated[
         Path | None,
         typer.Option("--write", help="Project file that gets the gains: PROJECT, or one beside."),
@@ -236,7 +243,7 @@ def tune(
             share=share,
             delay_ms=delay_ms,
             safety=safety,
-            damping_ratio=damping_ratio,
+            limits=limit or [],
             write=write,
             as_json=as_json,
         )

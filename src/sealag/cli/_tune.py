@@ -20,6 +20,10 @@ _PROMISES = {
     "constant": "this robot beside its rest, every constant delay up to it; no jitter, no hold",
 }
 """What holds for gains that reach the required delay by a number."""
+_GOALS = {"bandwidth": "bandwidth", "damping-ratio": "damping_ratio"}
+"""Names in --aim, and what `tune` calls them."""
+_UNITS = {"bandwidth": "Hz", "rms": "Nm", "noise": ""}
+"""Unit of each limit."""
 
 
 def tune_project(
@@ -27,6 +31,7 @@ def tune_project(
     motion: Path | None,
     *,
     aim: str,
+    limits: list[str],
     delay_ms: float | None,
     write: Path | None,
     as_json: bool,
@@ -37,7 +42,10 @@ def tune_project(
     Returns:
         0 if gains were found and certified, else 1.
     """
-    word, bandwidth = _aim(aim)
+    word, goals = _aim(aim)
+    allowed = dict(_limit(text) for text in limits)
+    if len(allowed) < len(limits):
+        raise InputError("--limit gives one quantity twice; give each once.")
     system = design.load(project)
     delay = None if delay_ms is None else seconds_from_ms(delay_ms)
     if write is not None:
@@ -45,7 +53,7 @@ def tune_project(
     along = system.motion_of(motion)
     compile_kernels()
     with busy("tuning", along):
-        tuned = tune(system, along, aim=word, bandwidth=bandwidth, delay=delay, **asked)
+        tuned = tune(system, along, aim=word, limits=allowed, delay=delay, **goals, **asked)
     written = write if tuned.found else None
     if written is not None:
         write_text(written, tuned.system.text)
@@ -56,18 +64,34 @@ def tune_project(
     return 0 if tuned.found else 1
 
 
-def _aim(aim: str) -> tuple[str, float | None]:
-    """The aim, and the bandwidth that --aim bandwidth=NUMBER gives."""
-    word, given, text = aim.partition("=")
-    if not given:
-        return word, None
-    value = number_of(text)
-    if word != "bandwidth" or value is None:
+def _aim(aim: str) -> tuple[str, dict[str, float]]:
+    """The aim, and what --aim bandwidth=30,damping-ratio=0.7 gives of joint PD."""
+    word, *parts = aim.split(",")
+    word, given, text = word.partition("=")
+    pairs = [("bandwidth", text)] if given else []
+    pairs += [(name, text) for name, _, text in (part.partition("=") for part in parts)]
+    goals = {_GOALS.get(name, name): number_of(text) for name, text in pairs}
+    if not pairs:
+        return word, {}
+    if word != "bandwidth" or not set(goals) <= set(_GOALS.values()) or None in goals.values():
         raise InputError(
-            f"--aim is {aim!r}; it must be stiffness, bandwidth, bandwidth=NUMBER (rad/s), damping "
-            "or drag."
+            f"--aim is {aim!r}; it must be one of stiffness, damping, drag, shaping, bandwidth or "
+            "bandwidth=NUMBER "
+            "(rad/s); damping-ratio=NUMBER may follow bandwidth behind a comma."
         )
-    return word, value
+    return word, {name: value for name, value in goals.items() if value is not None}
+
+
+def _limit(text: str) -> tuple[str, float]:
+    """A quantity and its limit: bandwidth=8Hz or rms=5Nm, with or without the unit."""
+    name, _, number = text.partition("=")
+    value = number_of(number.removesuffix(_UNITS.get(name, "")).strip())
+    if name not in _UNITS or value is None:
+        raise InputError(
+            f"--limit is {text!r}; it must be bandwidth=NUMBER (Hz), rms=NUMBER (Nm) or "
+            "noise=NUMBER."
+        )
+    return name, value
 
 
 def _check_target(path: Path, system: System, motion: Path | None, delay: float | None) -> None:
@@ -109,6 +133,7 @@ def _show(tuned: Any, path: Path | None) -> None:
         rows += [(name, _gain(value)) for name, value in tuned.gains().items()]
     if tuned.found:
         rows.append(("promised", _PROMISES[question.number]))
+        rows += _transparency(tuned)
     if tuned.certificate is not None:
         status = tuned.certificate.answer.status.value.replace("_", " ")
         asked = "" if question.number == "passive" else " (of the passive number, not asked for)"
@@ -130,6 +155,21 @@ def _show(tuned: Any, path: Path | None) -> None:
         show(f"{name:26} {value}")
     for reason in tuned.reasons:
         show(f"not tuned because {reason}")
+
+
+def _transparency(tuned: Any) -> list[tuple[str, str]]:
+    """The least transparent joint by each quantity that has a limit."""
+    shown = tuned.summary()["transparency"]
+    rows = []
+    for name, limit in tuned.question.limits.items():
+        if name == "noise":  # its gain follows from the shaping
+            continue
+        unit, least = _UNITS[name], name == "bandwidth"
+        values = shown[f"{name}_{unit.lower()}"]
+        joint = (min if least else max)(values, key=values.get)
+        row = f"{values[joint]:.6g} {unit} at {joint} (limit {limit:g} {unit})"
+        rows.append((f"{name} of the torque", row))
+    return rows
 
 
 def _gain(values: dict[str, Any]) -> str:

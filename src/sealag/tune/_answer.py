@@ -9,7 +9,8 @@ import numpy as np
 from sealag.design import System, certify
 from sealag.errors import ContractionError, SolverError
 from sealag.passivity import Certificate, Criterion, Status
-from sealag.tune._question import Number, Question, pd_keys
+from sealag.tune._question import Aim, Number, Question, pd_keys
+from sealag.tune._room import transparency_of
 from sealag.tune._write import as_file, kd_of_file
 from sealag.typing import Array
 from sealag.units import time_text
@@ -24,8 +25,10 @@ class Binding:
     """What stops a gain.
 
     Attributes:
-        kind: "delay"; "spring" where the springs have more of the limiting compliance; "stability"
-            where the loop loses its stability before its passivity, or even without delay.
+        kind: "delay"; "transparency" where its limit keeps damping away that the delay asks for;
+            "period" or "noise" where it bounds the shaping; "spring" where the springs have more of
+            the limiting compliance; "stability" where the loop loses its stability before its
+            passivity, or even without delay.
         instant: index of the instant.
         time_s: its time, s.
         joint: the joint with the largest share in the limiting motion.
@@ -148,6 +151,10 @@ class Tuned:
         else:
             found["K_x"] = {task.name: np.asarray(task.stiffness).tolist() for task in law.tasks}
         found["D_theta"] = dict(zip(joints, self.system.actuators.motor_damping.tolist()))
+        if self.question.aim is Aim.SHAPING:
+            found["inertia_shaping"] = dict(
+                zip(joints, self.system.actuators.inertia_shaping.tolist())
+            )
         return found
 
     def summary(self) -> dict[str, Any]:
@@ -166,6 +173,8 @@ class Tuned:
             "bandwidth_rad_s": self.bandwidth_rad_s,
             "factors": dict(self.factors),
             **self.gains(),
+            "limits": dict(asked.limits),
+            "transparency": transparency_of(asked, self.system),
             "binding": None if self.binding is None else asdict(self.binding),
             "certificate": None if certificate is None else certificate.summary(),
             "reasons": list(self.reasons),

@@ -130,10 +130,10 @@ def rounded(system: System, *, up: bool = False) -> System:
         up: instead of its stiffness, round its motor damping, and up.
     """
     if up:
-        damping = _floor(-system.actuators.motor_damping)
+        damping = floored(-system.actuators.motor_damping)
         return replace(system, actuators=replace(system.actuators, motor_damping=-damping))
     tasks = (
-        task if np.ndim(task.stiffness) == 2 else replace(task, stiffness=_floor(task.stiffness))
+        task if np.ndim(task.stiffness) == 2 else replace(task, stiffness=floored(task.stiffness))
         for task in system.law.tasks
     )
     return replace(system, law=replace(system.law, tasks=tuple(tasks)))
@@ -142,6 +142,15 @@ def rounded(system: System, *, up: bool = False) -> System:
 _DECIMAL = Context(prec=DIGITS, rounding=ROUND_FLOOR)
 
 
-def _floor(values: Array) -> Array:
-    """The values rounded down to DIGITS digits."""
-    return np.vectorize(lambda x: float(_DECIMAL.create_decimal(float(x))), otypes=[float])(values)
+def floored(values: Array) -> Array:
+    """Return values rounded down to DIGITS digits.
+
+    Args:
+        values: of any shape.
+    """
+    return np.vectorize(_floor, otypes=[float])(values)
+
+
+def _floor(value: float) -> float:
+    """The value rounded down; by its shortest text, so that few digits stay what they are."""
+    return float(_DECIMAL.create_decimal(repr(float(value))))

@@ -14,6 +14,8 @@ _ROUNDS = 100
 """Rounds in which violated instants are added; examples need 2 to 6."""
 _MET = 1e-7
 """Relative violation at which an instant counts as met; what is left is scaled away."""
+_SLIVER = 1.0 - 1e-6
+"""Share of the most damping from which on it is the answer itself."""
 _NONE = 1e-12
 """Share of the largest stiffness below which a group moves nothing at an instant."""
 
@@ -140,13 +142,16 @@ def _fair(unit: Array) -> Array:
     return _solved(problem, f)
 
 
-def least_damping(F: Sequence[Array] | Array, cost: Array, floor: Array) -> Array:
-    """Return the diagonal D ≥ floor with the least cost·D that has D ≽ ± F_t at every instant.
+def least_damping(
+    F: Sequence[Array] | Array, cost: Array, floor: Array, most: Array | float = np.inf
+) -> Array:
+    """Return the diagonal D in floor … most with the least cost·D and D ≽ ± F_t at every instant.
 
     Args:
         F: (N, n, n) d F_θ, symmetric, Nms/rad.
         cost: (n,) positive weights.
         floor: (n,) smallest damping, Nms/rad.
+        most: (n,) largest damping, Nms/rad, which is enough; inf for none.
 
     Returns:
         (n,) Nms/rad; feasible to rounding.
@@ -160,29 +165,36 @@ def least_damping(F: Sequence[Array] | Array, cost: Array, floor: Array) -> Arra
     root = np.sqrt(np.maximum(np.abs(np.einsum("tii->ti", F)).max(axis=0), floor))
     root = np.where(root > 0.0, root, 1.0)
     scaled = both / np.multiply.outer(root, root)
-    weight, least = cost * root**2, floor / root**2
+    weight, least, highest = cost * root**2, floor / root**2, most / root**2
+    # Where hardly anything else than the most will do, a solver finds nothing.
+    with np.errstate(divide="ignore"):
+        size = 1.0 / np.sqrt(highest)
+    if np.linalg.eigvalsh(scaled * np.multiply.outer(size, size))[:, -1].max() > _SLIVER:
+        return np.broadcast_to(most, root.shape).copy()
     active = [int(np.linalg.eigvalsh(scaled)[:, -1].argmax())]
     for _ in range(_ROUNDS):
-        y = _cheapest(scaled[active], weight / weight.max(), least)
+        y = _cheapest(scaled[active], weight / weight.max(), least, highest)
         half = np.sqrt(y)
         top = np.linalg.eigvalsh(scaled / np.multiply.outer(half, half))[:, -1]
         worst = int(top.argmax())
         if top[worst] <= 1.0 + _MET or worst in active:
-            return np.maximum(y * max(float(top[worst]), 1.0) * root**2, floor)
+            return np.clip(y * max(float(top[worst]), 1.0) * root**2, floor, most)
         active.append(worst)
     raise SolverError(f"no damping was found in {_ROUNDS} rounds; take fewer instants")
 
 
-def _cheapest(F: Array, weight: Array, least: Array) -> Array:
-    """argmin weight·y with diag(y) ≽ F_k and y ≥ least."""
+def _cheapest(F: Array, weight: Array, least: Array, most: Array) -> Array:
+    """argmin weight·y with diag(y) ≽ F_k and least ≤ y ≤ most."""
     import cvxpy as cp
 
     y = cp.Variable(len(weight))
     limits: list[Any] = [cp.diag(y) - one >> 0 for one in F]
-    return np.maximum(
-        _solved(cp.Problem(cp.Minimize(weight @ y), [*limits, y >= least]), y),
-        np.maximum(least, 1e-12),
-    )
+    limits.append(y >= least)
+    held = np.isfinite(most)
+    if held.any():
+        limits.append(y[held] <= most[held])
+    found = _solved(cp.Problem(cp.Minimize(weight @ y), limits), y)
+    return np.clip(found, np.maximum(least, 1e-12), most)
 
 
 def _solved(problem: Any, variable: Any) -> Array:

@@ -1,7 +1,10 @@
 """What is asked: which gain, for which number, how the knob is shared."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+
+import numpy as np
 
 from sealag.design import System
 from sealag.errors import InputError
@@ -19,6 +22,15 @@ class Aim(StrEnum):
     BANDWIDTH = "bandwidth"
     DAMPING = "damping"
     DRAG = "drag"
+    SHAPING = "shaping"
+
+
+class Limit(StrEnum):
+    """What a design must keep to besides the delay."""
+
+    BANDWIDTH = "bandwidth"
+    RMS = "rms"
+    NOISE = "noise"
 
 
 class Number(StrEnum):
@@ -50,6 +62,8 @@ class Question:
         required: the delay that the number must reach, s: safety times that of the design.
         bandwidth: of joint PD, rad/s; None for the largest.
         damping_ratio: of joint PD.
+        limits: of transparency: least bandwidth of the locked joints, Hz; largest RMS of Γ_sea
+            against its command along the motion, Nm; of shaping: largest gain of torque noise.
     """
 
     system: System
@@ -60,6 +74,7 @@ class Question:
     required: float
     bandwidth: float | None
     damping_ratio: float
+    limits: Mapping[Limit, float]
 
     def __post_init__(self) -> None:
         """Refuse what has no answer.
@@ -92,6 +107,52 @@ class Question:
                 f"{self.system.name} has no joint PD whose bandwidth could be set "
                 '(controller.kind = "joint_pd"); maximize stiffness.'
             )
+        if self.aim is Aim.SHAPING or Limit.NOISE in self.limits:
+            self._check_shaping()
+        elif self.limits:
+            self._check_limits()
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a motion of two instants and more, of which there are means."""
+        return self.motion is not None and len(self.motion) > 1
+
+    def _check_shaping(self) -> None:
+        """Refuse shaping without a period, and limits that are not its own."""
+        if self.aim is not Aim.SHAPING or set(self.limits) - {Limit.NOISE}:
+            raise InputError(
+                "The limit noise is for shaping (--aim shaping), and the only one that it takes."
+            )
+        if not self.system.delays.embedded_period > 0.0:
+            raise InputError(
+                f"{self.system.name} states no period of its drives' loop, which bounds the "
+                "shaping; give embedded_period_ms in [delays]."
+            )
+
+    def _check_limits(self) -> None:
+        """Refuse limits that nothing keeps, or whose closed forms do not hold."""
+        if self.aim is Aim.BANDWIDTH or self.number is not Number.PASSIVE:
+            raise InputError(
+                "Limits of transparency are for the largest stiffness, the least damping or drag "
+                "by the passive number only; leave --limit out."
+            )
+        if Limit.RMS in self.limits and not self.moves:
+            raise InputError(
+                "The RMS of the torque against its command is one along a motion; give a motion "
+                "(--motion), or limit the bandwidth."
+            )
+        drives = self.system.actuators
+        for key, there in (
+            ("spring_damping", drives.spring_damping > 0.0),
+            ("viscous_friction", drives.viscous_friction > 0.0),
+            ("torque_bandwidth", np.isfinite(drives.torque_bandwidth)),
+        ):
+            if there.any():
+                joint = drives.joints[int(there.argmax())]
+                raise InputError(
+                    f"{joint} has {key}, which the closed forms of transparency leave out; remove "
+                    "it, or leave --limit out."
+                )
 
 
 def pd_keys(system: System) -> object | None:

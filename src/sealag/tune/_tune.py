@@ -1,7 +1,7 @@
 """Which gain should I use? Largest stiffness or bandwidth, least damping, for a delay."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +12,11 @@ from sealag.robot import Motion
 from sealag.tune._answer import Tuned, number_of, passive_bound
 from sealag.tune._gains import rounded
 from sealag.tune._joint_pd import joint_inertia, pd_design
-from sealag.tune._passive import EASE, Knobs, damped, least_of
-from sealag.tune._question import LARGEST_SAFETY, Aim, Number, Question, Share
+from sealag.tune._passive import EASE, Knobs, damped
+from sealag.tune._question import LARGEST_SAFETY, Aim, Limit, Number, Question, Share
+from sealag.tune._room import closed_text, least_of, room_of
 from sealag.tune._search import first_crossing
+from sealag.tune._shaping import least_shaping
 from sealag.typing import Array
 from sealag.units import check_delay_s, time_text
 
@@ -22,6 +24,8 @@ _SCALES = (1e-3, 1e4)
 """Factors of the stiffness among which a margin is searched."""
 _BANDWIDTHS = (0.1, 1e4)
 """rad/s: bandwidths that are searched."""
+_LIMITS = (1e-6, 1e6)
+"""Hz, Nm: limits that are taken."""
 _SHARES = (1.0 - 1e-4, 1.0 - 1e-2, 0.95, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1)
 """Shares of the passive limit that are tried where stability ends before."""
 _WIDTH = 1e-4
@@ -43,6 +47,7 @@ def tune(
     delay: float | None = None,
     bandwidth: float | None = None,
     damping_ratio: float = 1.0,
+    limits: Mapping[str, float] | None = None,
 ) -> Tuned:
     """Find gains for a delay, over a posture or all instants of a motion (docs/theory section 16).
 
@@ -51,7 +56,7 @@ def tune(
         motion: its instants; the posture if None.
         aim: stiffness, the largest K_x or K_p; bandwidth, the largest ω of joint PD, or what a
             given one tolerates; damping, the least trace D_θ; drag, the least energy that D_θ takes
-            along the motion.
+            along the motion; shaping, the least β that loop rate and torque noise allow.
         number: the delay that must reach the required one: passive (closed form or a convex
             program, certified), jitter or constant (the first crossing from small gains up).
         share: what has a factor of its own: common (all tasks), task, or direction (of joint PD:
@@ -61,6 +66,10 @@ def tune(
             connections.
         bandwidth: ω of joint PD, rad/s; the largest that the delay leaves if None.
         damping_ratio: ζ of joint PD.
+        limits: of transparency, for stiffness, damping and drag: bandwidth, the least of the locked
+            joints, Hz; rms, the largest of Γ_sea against its command along the motion, Nm. For the
+            largest stiffness motor damping is set to the most that they leave. For shaping: noise,
+            the largest gain |B / B_s − 1| of torque noise.
 
     Returns:
         The gains, or why there are none; no gain is a result, not an error.
@@ -85,9 +94,12 @@ def tune(
         required=safety * system.delays.d_1,
         bandwidth=bandwidth,
         damping_ratio=damping_ratio,
+        limits=_limits(limits or {}),
     )
     if question.aim is Aim.BANDWIDTH:
         return _bandwidth(question)
+    if question.aim is Aim.SHAPING:
+        return least_shaping(question)
     if question.aim is not Aim.STIFFNESS:
         return _least_damping(question)
     if question.number is Number.PASSIVE:
@@ -98,6 +110,12 @@ def tune(
 def _check(name: str, value: float, low: float, high: float) -> None:
     if not (math.isfinite(value) and low <= value <= high):
         raise InputError(f"{name} is {value:g}; it must lie in {low:g} … {high:g}.")
+
+
+def _limits(given: Mapping[str, float]) -> dict[Limit, float]:
+    for name, value in given.items():
+        _check(f"The limit {name}", value, *_LIMITS)
+    return {word(Limit, name, what="limit"): value for name, value in given.items()}
 
 
 def _delayed(system: System, delay: float) -> System:
@@ -117,7 +135,10 @@ def _delayed(system: System, delay: float) -> System:
 
 def _stiffest(question: Question) -> Tuned:
     """Largest stiffness by the passive number: the closed form, or the fairest factors."""
-    knobs = Knobs(question)
+    room = room_of(question)
+    if room.closed().any():
+        return Tuned.none(question, closed_text(question, room))
+    knobs = Knobs(question, room.design(question.system))
     _, at_limit = knobs.stiffest(question.required)
     if at_limit.scale == 0.0:
         return Tuned.none(question, "gravity compensation alone is stiffer than the delay allows")
@@ -125,7 +146,9 @@ def _stiffest(question: Question) -> Tuned:
     common = question.share is Share.COMMON
     limit = _limit(at_limit.scale) if common else _mean(knobs.stiffest(question.required)[0])
 
-    def at(share: float, kind: str = "delay") -> Tuned:
+    stopper = "transparency" if question.limits else "delay"
+
+    def at(share: float, kind: str = stopper) -> Tuned:
         gains = share * factors
         return Tuned.of(
             question,
@@ -134,7 +157,7 @@ def _stiffest(question: Question) -> Tuned:
             factors={group.name: float(gain) for group, gain in zip(knobs.groups, gains)},
             scale=float(gains[0]) if common else None,
             limit=limit,
-            spring_share=wall.spring if kind == "delay" else 0.0,
+            spring_share=0.0 if kind == "stability" else wall.spring,
         )
 
     tuned = at(1.0)
@@ -173,15 +196,19 @@ def _mean(factors: Array) -> float:
 
 def _least_damping(question: Question) -> Tuned:
     """Least damping by the passive number; a margin goes on from there in its direction."""
-    at_limit = damped(question, question.required)
-    eased = damped(question, question.required * (1.0 + EASE))
-    if at_limit is None or eased is None:
-        return Tuned.none(
-            question, "the tasks are stiffer than the springs; tune the stiffness first"
-        )
+    room = room_of(question)
+    if room.closed().any():
+        return Tuned.none(question, closed_text(question, room))
+    at_limit = damped(question, question.required, room)
+    eased = damped(question, question.required * (1.0 + EASE), room)
+    if isinstance(at_limit, str):
+        return Tuned.none(question, at_limit)
+    if isinstance(eased, str):
+        return Tuned.none(question, eased)
     (_, cost), (design, _) = at_limit, eased
     if question.number is Number.PASSIVE:
-        return Tuned.of(question, design, limit=cost)
+        held = (design.actuators.motor_damping >= room.most * (1.0 - EASE)).any()
+        return Tuned.of(question, design, kind="transparency" if held else "delay", limit=cost)
     drives, floor = design.actuators, least_of(question.system)
 
     def less(factor: float) -> System:

@@ -32,13 +32,18 @@ def as_file(before: System, after: System) -> System:
     if source is None:
         return after
     document = tomlkit.parse(source.text)
+    old, new, joints = before.actuators, after.actuators, after.robot.joints
     if pd_keys(before):
         _put_pd(document, before, after)
     else:
-        for table, old, new in zip(document["tasks"], before.law.tasks, after.law.tasks):
-            if not np.array_equal(old.stiffness, new.stiffness):
-                table["stiffness"] = _plain(new.stiffness)
-        _put_damping(document, before, after)
+        for table, was, task in zip(document["tasks"], before.law.tasks, after.law.tasks):
+            if not np.array_equal(was.stiffness, task.stiffness):
+                table["stiffness"] = _plain(task.stiffness)
+        damping = old.motor_damping, new.motor_damping
+        _put_drives(document, "motor_damping", joints, *damping)
+    if not np.array_equal(old.shaped_inertia, new.shaped_inertia):
+        shaping = _tidy(old.inertia_shaping), _tidy(new.inertia_shaping)
+        _put_drives(document, "inertia_shaping", joints, *shaping)
     text = tomlkit.dumps(document)
     if tomllib.loads(text) != document.unwrap():  # dotted keys, which TOML Kit cannot extend
         raise InputError(
@@ -139,18 +144,17 @@ def _new_table(parent: Any, **kind: bool) -> Any:
     return tomlkit.table(**kind)
 
 
-def _put_damping(document: Any, before: System, after: System) -> None:
-    """Write motor damping where it differs from what stands there."""
-    old, new = before.actuators.motor_damping, after.actuators.motor_damping
+def _put_drives(document: Any, key: str, joints: Sequence[str], old: Array, new: Array) -> None:
+    """Write a quantity of the drives where it differs from what stands there."""
     actuators = document["actuators"]
     if "joint" not in actuators:
         actuators["joint"] = _new_table(actuators, is_super_table=True)
-    for name, was, value in zip(after.robot.joints, old.tolist(), new.tolist()):
+    for name, was, value in zip(joints, old.tolist(), new.tolist()):
         if was == value:
             continue
         if name not in actuators["joint"]:
             actuators["joint"][name] = _new_table(actuators["joint"])
         table = actuators["joint"][name]
-        table["motor_damping"] = value
+        table[key] = value
     if not actuators["joint"]:
         del actuators["joint"]
