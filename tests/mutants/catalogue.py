@@ -414,6 +414,13 @@ MUTANTS = [
          "turn[rows] = angle", "equal joints that turn by 2π together"),
     ),
     *_of(
+        "passivity", "passivity/_sweep.py",
+        ("np.minimum(self._above(limit), conjugate._above(limit))", "self._above(limit)",
+         "roots below the real axis"),
+        ("self._distances(-1j * own, limit)", "self._distances(1j * own, limit)",
+         "which way eigenvalues move"),
+    ),
+    *_of(
         "passivity", "passivity/_claims.py",
         ("Status.CERTIFIED if answer.stable is True and rests else",
          "Status.CERTIFIED if rests else",

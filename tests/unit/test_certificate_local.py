@@ -76,6 +76,43 @@ def test_crossings_of_random_plants_hold_and_later_ones_do_not():
     assert later == 8
 
 
+def random_loops(count):
+    """Dense ones, oscillators that hardly decay, and two equal arms side by side."""
+    rng = np.random.default_rng(11)
+    while count:
+        n = int(rng.integers(2, 6))
+        A_0, A_1 = rng.normal(size=(2, n, n)) * 10.0 ** rng.uniform(-1.0, 1.0, (2, 1, 1))
+        A_0 -= (np.linalg.eigvals(A_0 + A_1).real.max() + 10.0 ** rng.uniform(-3, 1)) * np.eye(n)
+        if count % 3 == 0:
+            A_0, A_1 = np.kron(np.eye(2), A_0), np.kron(np.eye(2), A_1)
+        margin = DelayedLoop(A_0, A_1).margin()
+        if np.isfinite(margin.first_crossing):
+            count -= 1
+            yield A_0, A_1, margin
+
+
+def test_a_crossing_is_told_from_a_later_one():
+    """The sweep by eigenvalue discs knows of no search by Newton's method, and must agree."""
+    for A_0, A_1, margin in random_loops(12):
+        at = {"frequency": margin.frequency}
+        assert answers(with_loop(A_0, A_1, crossing=margin.first_crossing, **at))[NO_EARLIER].ok
+        for share in (1.01, 1.5, 40.0):
+            late = answers(with_loop(A_0, A_1, crossing=share * margin.first_crossing, **at))
+            assert not late[NO_EARLIER].ok
+            found = float(late[NO_EARLIER].detail.split()[0])
+            assert found == pytest.approx(margin.first_crossing, rel=1e-4)
+
+
+def test_roots_below_the_real_axis_are_swept_too():
+    """λ² + 0.2 λ + 1 = ½ e^{-λd} crosses first after more than half a turn."""
+    A_0, A_1 = np.array([[0.0, 1.0], [-1.0, -0.2]]), np.array([[0.0, 0.0], [0.5, 0.0]])
+    margin = DelayedLoop(A_0, A_1).margin()
+    first, omega = margin.first_crossing, margin.frequency
+    assert np.pi < first * omega < 2.0 * np.pi
+    assert answers(with_loop(A_0, A_1, crossing=first, frequency=omega))[NO_EARLIER].ok
+    assert not answers(with_loop(A_0, A_1, crossing=1.01 * first, frequency=omega))[NO_EARLIER].ok
+
+
 def slow_design():
     """Hume held, with damping so strong that its first crossing takes two days."""
     system = sealag.load(EXAMPLES / "hume_held.toml")

@@ -17,7 +17,7 @@ from sealag.passivity import Certificate, Criterion
 SEED = 20261124
 CHECKERS = (
     "reading", "certificate", "stated", "statement", "layout", "kinds", "checks", "claims",
-    "definite", "proofs", "shared", "supremum", "local", "axis", "headline",
+    "definite", "proofs", "shared", "supremum", "local", "axis", "sweep", "headline",
 )  # fmt: skip
 
 

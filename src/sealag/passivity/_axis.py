@@ -1,8 +1,4 @@
-"""Roots of ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e) on and right of the axis, in doubles.
-
-A root jω at the delay d is an eigenvalue of A_0 + e^{-jψ} A_1 with ψ = ωd: for all delays, one
-circle of ψ has to be searched.
-"""
+"""Roots of ẋ = A_0 x + A_1 x(t − d) + A_e x(t − e) on and right of the axis, in doubles."""
 
 import math
 from collections.abc import Sequence
@@ -14,22 +10,9 @@ import numpy as np
 from sealag.passivity._definite import EPS
 from sealag.typing import Array
 
-EARLIER = 1e-6
-"""Relative distance below which two crossings are not distinguished. Ten times less cuts the circle
-into pieces that rounding keeps open; ten times more passes a crossing 1e-5 too late."""
-
 _TURN = 0.5
 _FAR = 0.1
 _MOST_FREQUENCIES = 60_000
-_MOST_ENTRIES = 12_000_000
-"""Of all matrices over pieces of the circle: 4,000 pieces for 56 states, 80,000 for 12. A lightly
-damped pair of roots takes 10,000; ten times more entries take minutes."""
-
-_NARROW = 1e-3 * EARLIER
-_SLOW = 1e-4
-"""Narrowest piece of the circle, relative to its phase, which counts as at least the second:
-rounding keeps narrower pieces from being excluded, and each cut would double their number."""
-
 _CHUNK = 512
 _ROWS = 16  # substituted together, so that most products are of matrices
 
@@ -95,64 +78,6 @@ def balanced(*parts: Array) -> tuple[Array, ...]:
             break
         size, scale = size * step / step[:, None], scale * step
     return tuple(part * scale / scale[:, None] for part in parts)
-
-
-def earliest_crossing(A_0: Array, A_1: Array, *, limit: float) -> float:
-    """Return a delay below which no root lies on the axis, up to a limit.
-
-    The circle ψ ∈ [0, π] is cut until no eigenvalue of A_0 + e^{-jψ} A_1 in a piece can be jω with
-    a delay ψ/|ω|, or (2π − ψ)/|ω| for the conjugate, below the limit. In the eigenvectors X of the
-    middle, the matrix is Λ + E with |E| ≤ |δ| |X⁻¹ A_1 X|, δ the distance from the middle, and its
-    eigenvalues lie in Gershgorin's discs.
-
-    Args:
-        A_0: (n, n), without roots on the axis at zero delay.
-        A_1: (n, n).
-        limit: s, inf for none.
-
-    Returns:
-        The limit if no root is on the axis before; else the shortest delay that is not excluded.
-    """
-    A_0, A_1 = balanced(A_0, A_1)
-    low, high = np.linspace(0.0, math.pi, 17)[:-1], np.linspace(0.0, math.pi, 17)[1:]
-    doubt, count = limit, 0
-    while len(low):
-        count += len(low)
-        delays = np.concatenate(
-            [_shortest(A_0, A_1, low[k : k + _CHUNK], high[k : k + _CHUNK])
-             for k in range(0, len(low), _CHUNK)]
-        )  # fmt: skip
-        open_ = delays < limit
-        if count * A_0.size > _MOST_ENTRIES:
-            return float(min(doubt, delays.min()))
-        low, high = low[open_], high[open_]
-        if (high - low <= _NARROW * np.maximum(high, _SLOW)).any():
-            return float(delays[open_].min())
-        middle = (low + high) / 2.0
-        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
-    return doubt
-
-
-def _shortest(A_0: Array, A_1: Array, low: Array, high: Array) -> Array:
-    """Shortest delay that each piece of the circle cannot exclude, (N,); inf if it excludes all."""
-    middle, half = (low + high) / 2.0, (high - low) / 2.0
-    A = A_0 + np.exp(-1j * middle)[:, None, None] * A_1
-    values, X = np.linalg.eig(A)
-    C = np.abs(np.linalg.solve(X, A_1 @ X))
-    rest = np.linalg.solve(X, A @ X)
-    rest[:, range(len(A_0)), range(len(A_0))] -= values
-    E = half[:, None, None] * C + 2.0 * np.abs(rest) + EPS * np.abs(values)[:, :, None] / len(A_0)
-    for _ in range(4):
-        scale = np.sqrt((E.sum(axis=2) + 1e-300) / (E.sum(axis=1) + 1e-300))
-        E = E * scale[:, None, :] / scale[:, :, None]
-    radius = E.sum(axis=2)
-    reach = np.abs(values.real) <= radius
-    with np.errstate(divide="ignore", invalid="ignore"):
-        up = np.where(reach & (values.imag + radius > 0.0), low[:, None], np.inf)
-        up = up / np.abs(values.imag + radius)
-        down = np.where(reach & (radius - values.imag > 0.0), 2.0 * math.pi - high[:, None], np.inf)
-        down = down / np.abs(radius - values.imag)
-    return np.minimum(up, down).min(axis=1, initial=np.inf)
 
 
 def unstable_roots(loop: DelayedLoop, delays: Sequence[float]) -> list[int | None]:

@@ -7,17 +7,12 @@ from typing import Annotated
 
 import numpy as np
 
-from sealag.passivity._axis import (
-    EARLIER,
-    DelayedLoop,
-    earliest_crossing,
-    roots_with_error,
-    unstable_roots,
-)
+from sealag.passivity._axis import DelayedLoop, roots_with_error, unstable_roots
 from sealag.passivity._checks import Check
 from sealag.passivity._kinds import Criterion, Place
 from sealag.passivity._proofs import AGREEMENT, InstantProof
 from sealag.passivity._statement import Answer, Question
+from sealag.passivity._sweep import EARLIER, earliest_crossing
 from sealag.typing import Array
 from sealag.units import time_text
 
