@@ -1,6 +1,5 @@
 """Gains written into the project file's text, with its comments and order kept."""
 
-import tomllib
 from collections.abc import MutableMapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,7 +8,7 @@ import numpy as np
 import tomlkit
 
 from sealag.design import System, load
-from sealag.errors import InputError
+from sealag.toml import table_in, text_of
 from sealag.tune._question import pd_keys
 from sealag.typing import Array
 
@@ -38,12 +37,11 @@ def as_file(before: System, after: System) -> System:
             if not np.array_equal(old.stiffness, new.stiffness):
                 table["stiffness"] = _plain(new.stiffness)
         _put_damping(document, before, after)
-    text = tomlkit.dumps(document)
-    if tomllib.loads(text) != document.unwrap():  # dotted keys, which TOML Kit cannot extend
-        raise InputError(
-            f"{source.files[0]}: the gains cannot be written beside its dotted keys; give each "
-            "joint a table of its own, [actuators.joint.NAME]."
-        )
+    text = text_of(
+        document,
+        refusal=f"{source.files[0]}: the gains cannot be written beside its dotted keys; give each "
+        "joint a table of its own, [actuators.joint.NAME].",
+    )
     read = load(source.files[0], text=text)
     return replace(read, delays=after.delays)
 
@@ -136,12 +134,12 @@ def _put_damping(document: Any, before: System, after: System) -> None:
     old, new = before.actuators.motor_damping, after.actuators.motor_damping
     actuators = document["actuators"]
     if "joint" not in actuators:
-        actuators["joint"] = tomlkit.table(is_super_table=True)
+        actuators["joint"] = table_in(actuators, header=False)
     for name, was, value in zip(after.robot.joints, old.tolist(), new.tolist()):
         if was == value:
             continue
         if name not in actuators["joint"]:
-            actuators["joint"][name] = tomlkit.table()
+            actuators["joint"][name] = table_in(actuators["joint"])
         table = actuators["joint"][name]
         table["motor_damping"] = value
     if not actuators["joint"]:
