@@ -38,7 +38,7 @@ _HOME = {
 
 _ROOMS = (
     "actuation", "delay", "design", "errors", "export", "margin", "passivity", "report", "robot",
-    "simulation", "tune", "walking", "whole_body",
+    "simulation", "sweep", "tune", "walking", "whole_body",
 )  # fmt: skip
 
 __all__ = [

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from humanoids2016._claims import Claim, Verdict
-from humanoids2016._parallel import in_parallel
 from humanoids2016._walk import TICK, Walk, WalkCase, simulate_walk, walking_of
 from sealag.design import load
 from sealag.typing import Array
+from sealag.workers import in_parallel
 
 BETAS = (0.1, 0.5, 1.0, 2.0)
 DAMPING_SCALES = (0.3, 1.0)

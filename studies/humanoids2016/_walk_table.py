@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from humanoids2016._claims import Claim, Verdict
-from humanoids2016._parallel import in_parallel
 from humanoids2016._walk import Walk, WalkCase, at_delay_scale, simulate_walk
 from humanoids2016._walk_errors import SensorNoise
 from sealag.delay import Delays
 from sealag.design import System, load
 from sealag.walking import Ground, GroundProfile, Walking
+from sealag.workers import in_parallel
 
 ENOUGH = 0.95
 """Share of terrains that must be walked."""
@@ -100,7 +100,7 @@ def walk_success(
         system = load(project)
         walks = [_summary(simulate_walk(system, case)) for _, case in work]
     else:
-        walks = in_parallel(_walk, work, jobs=jobs)
+        walks = list(in_parallel(_walk, work, jobs=jobs))
     count = 1 if grounds is None else len(grounds)
     rows = zip(cases, range(0, len(work), count))
     return tuple(WalkRow.of(name, walks[at : at + count]) for name, at in rows)

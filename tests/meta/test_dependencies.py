@@ -28,6 +28,7 @@ NOT_IMPORTED = {
     "daqp": "Pink's solver, asked for by name in bench/",
     "pandas": "sealag.extras imports it by name, where it is asked for",
     "control": "the same",
+    "distributed": "the same",
     "xacro": "the optional extra of this name, which the library imports where it is there",
 }
 

@@ -14,12 +14,12 @@ from helpers.source import ROOT
 _ASK = """
 import os, sys, time
 from pathlib import Path
-from humanoids2016._parallel import in_parallel
+from sealag.workers import in_parallel
 from workers import work, plainly
 if __name__ == "__main__":
     folder, way = sys.argv[1:]
     cases = [(folder,), (folder,)]
-    in_parallel(work, cases, jobs=2) if way == "watched" else plainly(cases)
+    list(in_parallel(work, cases, jobs=2)) if way == "watched" else plainly(cases)
 """
 _WORK = """
 import os, time

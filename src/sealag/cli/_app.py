@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from sealag.cli._options import Columns, Json, MotionFile, Project, Quaternion
 from sealag.cli._terminal import show
 from sealag.version import __version__
 
@@ -19,33 +20,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-Project = Annotated[str, typer.Argument(help="Project file (TOML), or bundled:hume.")]
-Json = Annotated[
-    bool, typer.Option("--json", help="Print one JSON object and nothing else; errors too.")
-]
-MotionFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--motion",
-        help="Motion to check: CSV, NPZ or Parquet with named columns, or a recording (MCAP). "
-        "Default: the project's motion, else its posture.",
-    ),
-]
-Columns = Annotated[
-    str | None,
-    typer.Option(
-        "--columns",
-        help="Names in the motion's file: theirs=ours,…, or a TOML or JSON file of it.",
-    ),
-]
-Quaternion = Annotated[
-    str | None,
-    typer.Option(
-        "--quaternion",
-        help="Order of base_qx … base_qw: xyzw or wxyz. Default: xyzw, questioned.",
-    ),
-]
 
 
 def _show_version(asked: bool) -> None:
@@ -245,6 +219,83 @@ def tune(
             safety=safety,
             limits=limit or [],
             write=write,
+            as_json=as_json,
+        )
+    )
+
+
+@app.command()
+def sweep(
+    project: Project,
+    over: Annotated[
+        list[str],
+        typer.Option(
+            "--over",
+            help="What is swept: KEY=1,2,5 or KEY=LOW:HIGH:log40 (lin40, int), as often as there "
+            "are keys. KEY is a dotted path in the project file, with places from 0 or names in "
+            "lists: tasks.0.stiffness.",
+        ),
+    ],
+    ask: Annotated[
+        str,
+        typer.Option(
+            "--ask",
+            help="certify, margin, simulate, tune, or tune:aim=damping,number=jitter.",
+        ),
+    ] = "certify",
+    motion: Annotated[
+        Path | None,
+        typer.Option("--motion", help="Motion. Default: the project's, else its posture."),
+    ] = None,
+    sample: Annotated[
+        str,
+        typer.Option(
+            "--sample",
+            help="grid; lhs:POINTS or lhs:POINTS:SEED, a Latin hypercube; sobol likewise.",
+        ),
+    ] = "grid",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Folder of the Parquet dataset; an unfinished sweep in it goes on. Default: "
+            "PROJECT.sweep.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", help="Processes. Default: one for each core.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            help="Address of a dask cluster to compute on instead, such as tcp://10.0.0.1:8786.",
+        ),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            help="Picture of it (PNG, SVG, PDF or HTML): a curve, a heat map, or parallel "
+            "coordinates.",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Ask many designs of a project, one row of a Parquet dataset each."""
+    from sealag.cli._sweep import sweep_project
+
+    raise typer.Exit(
+        sweep_project(
+            project,
+            over,
+            ask=ask,
+            motion=motion,
+            sample=sample,
+            out=out,
+            jobs=jobs,
+            scheduler=scheduler,
+            plot=plot,
             as_json=as_json,
         )
     )

@@ -9,7 +9,7 @@ from sealag.robot import Robot, Workspace
 from sealag.simulation._outcome import EventKind, Outcome
 from sealag.simulation._run import Run
 from sealag.typing import Array, IntArray
-from sealag.walking import Side, Walking
+from sealag.walking import Walking
 
 SPEED_TOLERANCE = 0.20
 """Relative. Ten times less calls every answer to a push a failed gait; ten times more calls a robot
@@ -33,7 +33,7 @@ class MeasuredGait:
         outcome: how the run ended.
         message: one sentence about the end; empty when completed.
         touchdown: (S + 1,) instants of the footholds, the first is the start, s.
-        foot: (S + 1,) the side of each foothold, a `Side`.
+        foot: (S + 1,) the side of each foothold, 0 left and 1 right.
         place: (S + 1, 3) footholds, m.
         apex_time: (A,) instants at which the CoM passes over the stance foot, s.
         apex_speed: (A,) forward speed of the CoM then, m/s.
@@ -75,7 +75,7 @@ class MeasuredGait:
         place = np.array(
             [robot.frame_placement(walking.feet[f], run.q[i])[1] for i, f in zip(index, sides)]
         )
-        lateral = np.array([side.lateral for side in sides[1:]])
+        lateral = 1.0 - 2.0 * np.array(sides[1:])  # +1 left, -1 right: y points to the left
         stood = np.searchsorted(np.array(times), run.time, side="right") - 1
         ahead = com[:, 0] - place[stood, 0]
         same = stood[1:] == stood[:-1]
@@ -140,13 +140,13 @@ class MeasuredGait:
         return f"{self.outcome.value} after {self.steps} steps: {self.message}"
 
 
-def _footholds(run: Run, walking: Walking) -> tuple[list[float], list[Side]]:
+def _footholds(run: Run, walking: Walking) -> tuple[list[float], list[int]]:
     """Instants of the touchdowns and which foot touched down, from the start on."""
-    times, sides = [0.0], [Side(int(run.contact_mode[0].argmax()))]
+    times, sides = [0.0], [int(run.contact_mode[0].argmax())]
     for event in run.events:
-        side = Side(walking.feet.index(event.foot))
+        side = walking.feet.index(event.foot)
         late = event.time - times[-1] > GRAZE * walking.gait.step_time
-        if event.kind is EventKind.TOUCHDOWN and side is not sides[-1] and late:
+        if event.kind is EventKind.TOUCHDOWN and side != sides[-1] and late:
             times.append(event.time)
             sides.append(side)
     return times, sides

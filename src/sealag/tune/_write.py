@@ -1,16 +1,14 @@
 """Gains written into the project file's text, with its comments and order kept."""
 
-import tomllib
 from collections.abc import MutableMapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import tomlkit
-from tomlkit.items import InlineTable
 
 from sealag.design import System, load
-from sealag.errors import InputError
+from sealag.toml import table_in, text_of
 from sealag.tune._question import pd_keys
 from sealag.typing import Array
 
@@ -44,12 +42,11 @@ def as_file(before: System, after: System) -> System:
     if not np.array_equal(old.shaped_inertia, new.shaped_inertia):
         shaping = _tidy(old.inertia_shaping), _tidy(new.inertia_shaping)
         _put_drives(document, "inertia_shaping", joints, *shaping)
-    text = tomlkit.dumps(document)
-    if tomllib.loads(text) != document.unwrap():  # dotted keys, which TOML Kit cannot extend
-        raise InputError(
-            f"{source.files[0]}: the gains cannot be written beside its dotted keys; give each "
-            "joint a table of its own, [actuators.joint.NAME]."
-        )
+    text = text_of(
+        document,
+        refusal=f"{source.files[0]}: the gains cannot be written beside its dotted keys; give each "
+        "joint a table of its own, [actuators.joint.NAME].",
+    )
     read = load(source.files[0], text=text)
     return replace(read, delays=after.delays)
 
@@ -137,23 +134,16 @@ def _put_each(table: Any, key: str, names: Sequence[str], values: Array) -> None
         table[key] = each
 
 
-def _new_table(parent: Any, **kind: bool) -> Any:
-    """An empty table of the only kind that its parent can hold."""
-    if isinstance(parent, InlineTable):
-        return tomlkit.inline_table()
-    return tomlkit.table(**kind)
-
-
 def _put_drives(document: Any, key: str, joints: Sequence[str], old: Array, new: Array) -> None:
     """Write a quantity of the drives where it differs from what stands there."""
     actuators = document["actuators"]
     if "joint" not in actuators:
-        actuators["joint"] = _new_table(actuators, is_super_table=True)
+        actuators["joint"] = table_in(actuators, header=False)
     for name, was, value in zip(joints, old.tolist(), new.tolist()):
         if was == value:
             continue
         if name not in actuators["joint"]:
-            actuators["joint"][name] = _new_table(actuators["joint"])
+            actuators["joint"][name] = table_in(actuators["joint"])
         table = actuators["joint"][name]
         table[key] = value
     if not actuators["joint"]:

@@ -1,6 +1,5 @@
 """Walking: ground, phase-space plan and its whole-body motion, gait, placement, controller."""
 
-from sealag.walking._feet import Side
 from sealag.walking._gait import WalkingGait
 from sealag.walking._ground import Ground, GroundProfile
 from sealag.walking._options import WalkingOptions
@@ -10,7 +9,6 @@ from sealag.walking._walk import Walking
 __all__ = [
     "Ground",
     "GroundProfile",
-    "Side",
     "WalkPlan",
     "Walking",
     "WalkingGait",

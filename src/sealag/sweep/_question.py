@@ -1,0 +1,273 @@
+"""What every point is asked, and the columns of the answer."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sealag.design import System, certify, simulate
+from sealag.errors import InputError, either, word
+from sealag.simulation import Outcome, Run
+from sealag.tune import tune
+from sealag.units import number_of
+
+_TUNE = ("aim", "number", "share", "safety", "damping_ratio")
+"""What `tune` can be told besides: words, then numbers."""
+_TUNE_NUMBERS = ("safety", "damping_ratio")
+
+
+class Ask(StrEnum):
+    """The command whose answer every point has."""
+
+    CERTIFY = "certify"
+    MARGIN = "margin"
+    TUNE = "tune"
+    SIMULATE = "simulate"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Question:
+    """What every point is asked.
+
+    Attributes:
+        ask: the command.
+        options: what else it is told; of `tune` only.
+    """
+
+    ask: Ask
+    options: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, text: str) -> "Question":
+        """Read certify, margin, simulate, tune, or tune:aim=damping,number=jitter.
+
+        Args:
+            text: the expression.
+
+        Raises:
+            InputError: it is none.
+        """
+        name, given, rest = text.partition(":")
+        ask = word(Ask, name, what="--ask")
+        if not given:
+            return cls(ask=ask, options={})
+        if ask is not Ask.TUNE:
+            raise InputError(
+                f"--ask is {text!r}; {ask} takes no options: give keys of the project a single "
+                "value, such as --over simulation.duration_s=2."
+            )
+        options: dict[str, Any] = {}
+        for part in rest.split(","):
+            key, _, value = part.partition("=")
+            number = number_of(value)
+            if key not in _TUNE or not value or (key in _TUNE_NUMBERS and number is None):
+                raise InputError(
+                    f"--ask is {text!r}; tune takes {either(_TUNE)}, such as tune:aim=damping."
+                )
+            options[key] = number if key in _TUNE_NUMBERS else value
+        return cls(ask=ask, options=options)
+
+    def check(self, system: System) -> None:
+        """Refuse a question that the project itself has no answer to.
+
+        Args:
+            system: the project's design.
+
+        Raises:
+            InputError: as the command would.
+        """
+        if self.ask in (Ask.CERTIFY, Ask.TUNE):
+            system.require_law("Bounds and tuned gains are")
+        if self.ask is Ask.SIMULATE:
+            system.duration()
+
+    @property
+    def columns(self) -> Mapping[str, type]:
+        """Names and types of what is answered; each can be null."""
+        return _COLUMNS[self.ask]
+
+    @property
+    def headline(self) -> str:
+        """The column that a plot shows."""
+        return _HEADLINES[self.ask]
+
+    @property
+    def verdict(self) -> str | None:
+        """The column whose words are counted."""
+        return _VERDICTS[self.ask]
+
+    def answer(self, system: System, motion: Path | None) -> dict[str, Any]:
+        """Ask a design.
+
+        Args:
+            system: the design.
+            motion: a motion's file, or None.
+
+        Returns:
+            By column; a time that no delay reaches is inf, what is not known None.
+
+        Raises:
+            SealagError: the command would refuse it.
+        """
+        if self.ask is Ask.SIMULATE:
+            return _run(system)
+        along = None
+        if motion is not None or system.motion_file is not None:
+            along = system.motion_of(motion, tell=_nothing)
+        return _ANSWERS[self.ask](system, along, self.options)
+
+
+def _nothing(_: str) -> None:
+    """What was left out of a motion is said once, before the sweep."""
+
+
+def _certify(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]:
+    answer = certify(system, along).confirmed().answer
+    return {
+        "status": answer.status.value,
+        "max_delay_s": answer.max_delay_s,
+        "delay_s": system.delays.d_1,
+        "local_margin_s": answer.local_margin_s,
+        "first_crossing_s": answer.first_crossing_s,
+        "stable": answer.stable,
+        "unstable_modes": answer.unstable_modes,
+        "limiting_joint": _largest(answer.worst.direction),
+        "worst_instant": answer.worst.instant,
+        "worst_time_s": answer.worst.time_s,
+        "reasons": "; ".join(answer.reasons),
+    }
+
+
+def _margin(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]:
+    found = system.local_margins(along)
+    return {
+        "passive_s": found.passive_s,
+        "jitter_s": found.jitter_s,
+        "delay_s": found.delay_s,
+        "first_crossing_s": found.first_crossing_s,
+        "frequency_rad_s": found.frequency_rad_s,
+        "unstable_modes": found.unstable_modes,
+        "limiting_joint": _largest(found.mode),
+        "instant": found.instant,
+        "time_s": found.time_s,
+        "not_passive": found.not_passive,
+    }
+
+
+def _tune(system: System, along: Any, options: Mapping[str, Any]) -> dict[str, Any]:
+    tuned = tune(system, along, **options)
+    binding = tuned.binding
+    return {
+        "found": tuned.found,
+        "reached_s": tuned.reached_s,
+        "required_s": tuned.question.required,
+        "delay_s": tuned.question.system.delays.d_1,
+        "scale": tuned.scale,
+        "limit": tuned.limit,
+        "bandwidth_rad_s": tuned.bandwidth_rad_s,
+        "binding": None if binding is None else binding.kind,
+        "limiting_joint": None if binding is None else binding.joint,
+        "reasons": "; ".join(tuned.reasons),
+    }
+
+
+def _run(system: System) -> dict[str, Any]:
+    run = simulate(system)
+    if run.outcome is Outcome.INTERRUPTED:
+        raise KeyboardInterrupt
+    told = run.summary(recording=Path())
+    known = {name: told[name] for name in _COLUMNS[Ask.SIMULATE] if name in told}
+    return {**known, "fell": run.outcome is Outcome.FELL, "deviation_rms": _deviation(system, run)}
+
+
+def _deviation(system: System, run: Run) -> float:
+    """Root mean square of q − posture over joints and logged instants, rad or m."""
+    n = len(run.joints)
+    total = 0.0
+    for rows in run.blocks():
+        total += float(np.square(run.q[rows, -n:] - system.posture[-n:]).sum())
+    return math.sqrt(total / (len(run.time) * n))
+
+
+def _largest(shares: Mapping[str, float]) -> str | None:
+    """The joint with the largest share; None where there is none."""
+    return max(shares, key=lambda name: shares[name]) if shares else None
+
+
+_ANSWERS: dict[Ask, Callable[..., dict[str, Any]]] = {
+    Ask.CERTIFY: _certify,
+    Ask.MARGIN: _margin,
+    Ask.TUNE: _tune,
+}
+
+_COLUMNS: dict[Ask, dict[str, type]] = {
+    Ask.CERTIFY: {
+        "status": str,
+        "max_delay_s": float,
+        "delay_s": float,
+        "local_margin_s": float,
+        "first_crossing_s": float,
+        "stable": bool,
+        "unstable_modes": int,
+        "limiting_joint": str,
+        "worst_instant": int,
+        "worst_time_s": float,
+        "reasons": str,
+    },
+    Ask.MARGIN: {
+        "passive_s": float,
+        "jitter_s": float,
+        "delay_s": float,
+        "first_crossing_s": float,
+        "frequency_rad_s": float,
+        "unstable_modes": int,
+        "limiting_joint": str,
+        "instant": int,
+        "time_s": float,
+        "not_passive": str,
+    },
+    Ask.TUNE: {
+        "found": bool,
+        "reached_s": float,
+        "required_s": float,
+        "delay_s": float,
+        "scale": float,
+        "limit": float,
+        "bandwidth_rad_s": float,
+        "binding": str,
+        "limiting_joint": str,
+        "reasons": str,
+    },
+    Ask.SIMULATE: {
+        "outcome": str,
+        "fell": bool,
+        "message": str,
+        "duration_s": float,
+        "deviation_rms": float,
+        "energy_residual_j": float,
+        "energy_throughput_j": float,
+        "joint_side_passive": bool,
+        "controller_side_passive": bool,
+        "largest_joint_speed_rad_s": float,
+        "largest_spring_torque_nm": float,
+        "total_age_s": float,
+    },
+}
+
+_HEADLINES = {
+    Ask.CERTIFY: "max_delay_s",
+    Ask.MARGIN: "delay_s",
+    Ask.TUNE: "limit",
+    Ask.SIMULATE: "deviation_rms",
+}
+
+_VERDICTS = {
+    Ask.CERTIFY: "status",
+    Ask.MARGIN: None,
+    Ask.TUNE: "found",
+    Ask.SIMULATE: "outcome",
+}
