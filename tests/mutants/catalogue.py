@@ -739,8 +739,8 @@ MUTANTS = [
     ),
     *_of(
         "tune", "tune/_passive.py",
-        ("series = system.law.signal.limits(drives.spring_stiffness, delay / D)",
-         "series = system.law.signal.limits(drives.spring_stiffness, delay / D / 1.001)",
+        ("drives.spring_stiffness, delay / drives.motor_damping",
+         "drives.spring_stiffness, delay / drives.motor_damping / 1.001",
          "stiffness above the delay's limit"),
         ("return Limits(parts=self._parts, held=self._held, series=series)",
          "return Limits(parts=self._parts, held=-self._held, series=series)",
@@ -781,7 +781,7 @@ MUTANTS = [
          "wanted = damping_ratio * bandwidth * inertia", "half the damping ratio"),
     ),
     *_of(
-        "tune", "tune/_write.py",
+        "tune", "toml.py",
         ("if isinstance(parent, InlineTable):", "if False:",
          "inline tables of actuators that end in a failure"),
     ),

@@ -13,8 +13,7 @@ app = typer.Typer(
     name="sealag",
     help="How much network delay a robot with springs in its joints tolerates.",
     epilog="Exit status: 0 yes or done, 1 no (not certified, passive only, fell, certificate does "
-    "not hold), 2 wrong "
-    "input or an answer that cannot be written, 3 the tool failed, 130 interrupted.",
+    "not hold), 2 wrong input or an answer that cannot be written, 3 failed, 130 interrupted.",
     context_settings={"help_option_names": ["-h", "--help"]},
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -238,15 +237,9 @@ def sweep(
     ],
     ask: Annotated[
         str,
-        typer.Option(
-            "--ask",
-            help="certify, margin, simulate, tune, or tune:aim=damping,number=jitter.",
-        ),
+        typer.Option("--ask", help="certify, margin, simulate, tune or tune:aim=…,number=…."),
     ] = "certify",
-    motion: Annotated[
-        Path | None,
-        typer.Option("--motion", help="Motion. Default: the project's, else its posture."),
-    ] = None,
+    motion: MotionFile = None,
     sample: Annotated[
         str,
         typer.Option(
