@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sealag.design._along import Along
 from sealag.design._criteria import bounds_along
@@ -15,6 +14,7 @@ from sealag.design._local import local_of
 from sealag.errors import ContractionError, InputError, SolverError
 from sealag.margin import DelayMargin
 from sealag.passivity import Basis, Criterion
+from sealag.typing import Array
 from sealag.whole_body import FrozenLoop
 
 
@@ -189,15 +189,14 @@ def _falling(loop: FrozenLoop, margin: DelayMargin, joints: tuple[str, ...]) -> 
         return {}
     present = loop.A_0 + loop.A_1 + (0.0 if loop.A_e is None else np.asarray(loop.A_e))
     roots, modes = np.linalg.eig(present)
-    fastest = int(roots.real.argmax())
+    growth = np.real(roots)
+    fastest = int(growth.argmax())
     # A double root at zero, as of a symmetry, splits by the square root of rounding, 1e-8 of the
     # loop; less than 1e-6 1/s grows in days. Ten times more would name none that falls in hours.
-    return _of_motors(loop, modes[:, fastest], joints) if roots[fastest].real > 1e-6 else {}
+    return _of_motors(loop, modes[:, fastest], joints) if growth[fastest] > 1e-6 else {}
 
 
-def _of_motors(
-    loop: FrozenLoop, mode: NDArray[np.complex128], joints: tuple[str, ...]
-) -> dict[str, float]:
+def _of_motors(loop: FrozenLoop, mode: Array, joints: tuple[str, ...]) -> dict[str, float]:
     """Share of each joint's motor in a motion."""
     motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
     size = np.abs(mode[motors])
