@@ -12,6 +12,48 @@ from helpers.designs import EXAMPLES
 BAXTER = EXAMPLES / "baxter.toml"
 CASE = EXAMPLES.parent / "tests" / "data" / "cases" / "s7_static_joint_gravity.toml"
 
+ARM = """
+[robot]
+urdf = "arm.urdf"
+base = "fixed"
+actuated = ["shoulder", "elbow"]
+[posture.joints]
+shoulder = 0.0
+elbow = 0.0
+[actuators.default]
+spring_stiffness = 3000.0
+rotor_inertia = 0.1
+inertia_shaping = 1.0
+motor_damping = 20.0
+[controller]
+kind = "joint_pd"
+gravity = "planned"
+damping_at = "drive"
+[controller.kp]
+shoulder = 400.0
+elbow = 2.0
+[controller.kd]
+shoulder = 1.0
+elbow = 1.0
+[delays]
+central_round_trip = { kind = "constant", value_ms = 4.0 }
+embedded_round_trip = { kind = "constant", value_ms = 1.0 }
+"""
+LINK = """
+<link name="{name}"><inertial><origin xyz="0 0 0.3"/><mass value="2"/>
+<inertia ixx="0.03" iyy="0.03" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="{joint}" type="revolute"><parent link="{parent}"/><child link="{name}"/>
+<origin xyz="0 0 {up}"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" effort="100" velocity="10"/></joint>
+"""
+
+
+def two_links():
+    """An upright arm of two links."""
+    upper = LINK.format(name="upper", joint="shoulder", parent="base", up=0.0)
+    lower = LINK.format(name="lower", joint="elbow", parent="upper", up=0.6)
+    return f'<robot name="arm"><link name="base"/>{upper}{lower}</robot>'
+
 
 def test_intervals_agree_with_counted_roots(cli):
     code, text, err = cli("margin", BAXTER, "--horizon-ms", "150", "--json")
@@ -103,4 +145,20 @@ def test_a_program_is_said_to_remember_and_to_bend(tmp_path, cli):
     code, text, err = cli("margin", project)
     assert (code, err) == (0, "")
     assert "one way varies, every delay below it" in text
-    assert re.search(r"controller +7 states; bends by 0\.\d+ of its answers", text)
+    assert re.search(r"controller +7 states; nonlinear by 0\.\d+ of its answers", text)
+
+
+def test_the_joint_that_falls_without_delay_is_named(tmp_path, cli):
+    """Gravity grows out of the elbow; what would cross first at a delay is another motion."""
+    project = tmp_path / "arm.toml"
+    project.write_text(ARM)
+    (tmp_path / "arm.urdf").write_text(two_links())
+    code, text, err = cli("margin", project)
+    assert (code, err) == (0, "")
+    assert re.search(r"unstable roots +1 without delay\n  grows without delay +elbow (\d+)%", text)
+    answer = json.loads(cli("margin", project, "--json")[1])
+    assert sum(answer["falling"].values()) == pytest.approx(1.0)
+    assert answer["falling"]["elbow"] > 0.9
+    project.write_text(ARM.replace("elbow = 2.0", "elbow = 200.0"))
+    answer = json.loads(cli("margin", project, "--json")[1])
+    assert (answer["unstable_modes"], answer["falling"]) == (0, {})

@@ -106,6 +106,7 @@ def test_no_gain_is_a_no(copy, cli):
     before = project.read_bytes()
     code, text, _ = cli("tune", project, "--aim", "bandwidth=3000", "--write", project)
     assert code == 1
+    assert text.startswith("not tuned ")
     assert "not tuned because" in text
     assert project.read_bytes() == before
     code, text, _ = cli("tune", PANDA, "--json")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from helpers.mimics import MIMICS, joint, link, robot
-from sealag.errors import RobotError, SealagError, UnknownNameError
+from sealag.errors import FileError, RobotError, SealagError, UnknownNameError
 from sealag.robot import Contact, load_robot
 
 ARM = (link("base"), link("a"), link("b"), joint("j", "base", "a"), joint("k", "a", "b"))
@@ -223,3 +223,8 @@ def test_links_that_weigh_nothing_are_named(mass, tmp_path):
         return
     with pytest.raises(RobotError, match=r"almost no inertia to what moves at a \(joint j\)"):
         read(tmp_path, text)
+
+
+def test_an_example_robot_that_is_not_there_is_no_missing_package():
+    with pytest.raises(FileError, match=r"example-robot-data has no file no/such\.urdf"):
+        load_robot("example-robot-data:no/such.urdf", floating_base=False)

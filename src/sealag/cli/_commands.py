@@ -1,7 +1,7 @@
 """Commands: each calls one function of the library and shows its answer."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
@@ -142,18 +142,25 @@ def margin_project(
         show(f"{f'  only {name} late':26} {time_text(value)}")
     if system.program is not None:
         states = f"{found.memory} states" if found.memory else "no memory"
-        show(f"{'controller':26} {states}; bends by {max(found.bend, 1e-6):.1g} of its answers")
+        show(f"{'controller':26} {states}; nonlinear by {max(found.bend, 1e-6):.1g} of its answers")
     show(f"{'delay of the design':26} {time_text(system.delays.d_1)}")
     show(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
     if found.frequency_rad_s is not None:
         show(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
     show(f"{'unstable roots':26} {found.unstable_modes} without delay")
+    if found.falling:
+        show(f"{'  grows without delay':26} {_largest(found.falling)}")
     show(f"{'zero roots of symmetries':26} {found.neutral}")
     show(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
-    mode = sorted(found.mode.items(), key=lambda item: -item[1])
-    show(f"{'mode':26} " + ", ".join(f"{name} {share:.0%}" for name, share in mode[:3]))
+    show(f"{'mode of first crossing':26} {_largest(found.mode)}")
     for low, high, count in found.intervals:
         show(f"{time_text(low):>14} to {time_text(high):14} {count} unstable roots")
+
+
+def _largest(shares: Mapping[str, float]) -> str:
+    """The three joints that take the largest part in a motion."""
+    largest = sorted(shares.items(), key=lambda item: -item[1])[:3]
+    return ", ".join(f"{name} {share:.0%}" for name, share in largest)
 
 
 def _sweep_rates(project: str, *, as_json: bool) -> None:

@@ -119,7 +119,10 @@ def _show(tuned: Any, path: Path | None) -> None:
     """Show gains, what stops them and by how much."""
     question, binding = tuned.question, tuned.binding
     rows = [
-        ("tuned", f"{question.aim} for the {question.number} number"),
+        (
+            "tuned" if tuned.found else "not tuned",
+            f"{question.aim} for the {question.number} number",
+        ),
         ("required", f"{time_text(question.required)} of {time_text(question.system.delays.d_1)}"),
         ("reached", time_text(tuned.reached_s)),
     ]

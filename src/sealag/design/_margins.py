@@ -14,6 +14,7 @@ from sealag.design._local import local_of
 from sealag.errors import ContractionError, InputError, SolverError
 from sealag.margin import DelayMargin
 from sealag.passivity import Basis, Criterion
+from sealag.typing import Array
 from sealag.whole_body import FrozenLoop
 
 
@@ -40,6 +41,8 @@ class LocalMargins:
         frequency_rad_s: frequency of that pair, rad/s; None without one.
         mode: share of each joint's motor in that pair's motion.
         unstable_modes: roots with positive real part without delay, at that instant.
+        falling: share of each joint's motor in the motion that grows fastest without delay; empty
+            where none grows, or where late torque feedback decides.
         neutral: zero roots by symmetry at that instant.
         equilibrium: "found", or why the loop has none.
         instant: index of that instant.
@@ -62,6 +65,7 @@ class LocalMargins:
     frequency_rad_s: float | None
     mode: Mapping[str, float]
     unstable_modes: int
+    falling: Mapping[str, float]
     neutral: int
     equilibrium: str
     instant: int
@@ -126,6 +130,7 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=_shares(loop, margin, system.robot.joints),
         unstable_modes=margin.unstable_roots,
+        falling=_falling(loop, margin, system.robot.joints),
         neutral=margin.neutral,
         equilibrium="found" if rest is not None and rest.found else local.problem,
         instant=local.critical,
@@ -160,6 +165,7 @@ def _of_program(along: Along, horizon: float | None) -> LocalMargins:
         frequency_rad_s=None if math.isnan(margin.frequency) else float(margin.frequency),
         mode=_shares(loop, margin, system.robot.joints),
         unstable_modes=margin.unstable_roots,
+        falling=_falling(loop, margin, system.robot.joints),
         neutral=margin.neutral,
         equilibrium="found",
         instant=0,
@@ -173,7 +179,26 @@ def _of_program(along: Along, horizon: float | None) -> LocalMargins:
 
 def _shares(loop: FrozenLoop, margin: DelayMargin, joints: tuple[str, ...]) -> dict[str, float]:
     """Share of each joint's motor in the motion that crosses first."""
+    mode = margin.mode if len(margin.mode) else np.zeros(len(loop.states))
+    return _of_motors(loop, mode, joints)
+
+
+def _falling(loop: FrozenLoop, margin: DelayMargin, joints: tuple[str, ...]) -> dict[str, float]:
+    """Share of each joint's motor in the motion that grows fastest without delay."""
+    if not margin.unstable_roots or loop.embedded_delay:
+        return {}
+    present = loop.A_0 + loop.A_1 + (0.0 if loop.A_e is None else np.asarray(loop.A_e))
+    roots, modes = np.linalg.eig(present)
+    growth = np.real(roots)
+    fastest = int(growth.argmax())
+    # A double root at zero, as of a symmetry, splits by the square root of rounding, 1e-8 of the
+    # loop; less than 1e-6 1/s grows in days. Ten times more would name none that falls in hours.
+    return _of_motors(loop, modes[:, fastest], joints) if growth[fastest] > 1e-6 else {}
+
+
+def _of_motors(loop: FrozenLoop, mode: Array, joints: tuple[str, ...]) -> dict[str, float]:
+    """Share of each joint's motor in a motion."""
     motors = [i for i, name in enumerate(loop.states) if name.startswith("theta:")]
-    size = np.abs(margin.mode[motors]) if len(margin.mode) else np.zeros(len(motors))
+    size = np.abs(mode[motors])
     shares = size / max(float(size.sum()), 1e-300)
     return dict(zip(joints, shares.tolist(), strict=True))

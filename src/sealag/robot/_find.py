@@ -32,6 +32,11 @@ def example_robot_path(relative: str) -> Path:
         path = folder / relative
         if is_inside(path, folder) and path.is_file():
             return path
+    for folder in (root / "example-robot-data" / "robots" for root in roots):
+        if folder.is_dir():
+            raise FileError(
+                f"example-robot-data has no file {relative}; its robots are files below {folder}."
+            )
     raise FileError(
         f"The example robot {relative} is not installed; "
         "install the Python package example-robot-data or give the path of your URDF."
