@@ -761,7 +761,7 @@ MUTANTS = [
         "tune", "tune/_tune.py",
         ("required=safety * system.delays.d_1", "required=system.delays.d_1",
          "a safety factor that is left out"),
-        ("less, low=_BELOW, high=_SCALES[1])", "less, low=1.0, high=_SCALES[1])",
+        ("less, low=_BELOW, high=min", "less, low=1.0, high=min",
          "no damping found where the jitter margin is the passive bound"),
         ("high = max(high, low * _SCALES[1])", "high = _SCALES[1]",
          "no stiffness found for soft gains"),

@@ -215,7 +215,8 @@ def _least_damping(question: Question) -> Tuned:
         damping = np.maximum(drives.motor_damping / factor, floor)
         return rounded(replace(design, actuators=replace(drives, motor_damping=damping)), up=True)
 
-    return _searched(question, less, low=_BELOW, high=_SCALES[1])
+    most = float((drives.motor_damping / floor).max())  # beyond, nothing is left to take
+    return _searched(question, less, low=_BELOW, high=min(most, _SCALES[1]))
 
 
 def _stiffest_by_margin(question: Question) -> Tuned:
@@ -255,7 +256,8 @@ def _searched(
         return value is not None and value >= required
 
     x = first_crossing(holds, low=low, high=high)
-    name = "bandwidth" if question.aim is Aim.BANDWIDTH else "factor"
+    names = {Aim.BANDWIDTH: "bandwidth", Aim.STIFFNESS: "factor"}
+    name = names.get(question.aim, "share of the passive damping, 1 /")
     if x is None:
         return Tuned.none(
             question,
