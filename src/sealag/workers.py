@@ -36,7 +36,8 @@ def in_parallel(
 
     work = (delayed(_answer)(os.getpid(), call, case) for case in cases)
     order = "generator" if ordered else "generator_unordered"
-    yield from Parallel(n_jobs=jobs, return_as=order, batch_size=1)(work)
+    choices: dict[str, Any] = {"return_as": order, "batch_size": 1}
+    yield from Parallel(n_jobs=jobs, **choices)(work)
 
 
 def _answer(parent: int, call: Callable[..., Any], case: tuple[Any, ...]) -> Any:

@@ -122,7 +122,7 @@ class Sample:
             return _hypercube(len(self.axes), self.points, self.seed)[start:stop]
         from scipy.stats import qmc
 
-        sequence = qmc.Sobol(len(self.axes), seed=np.random.default_rng(self.seed))
+        sequence = qmc.Sobol(len(self.axes), rng=np.random.default_rng(self.seed))
         if start:  # SciPy cannot go forward by nothing
             sequence.fast_forward(start)
         with warnings.catch_warnings():  # the balance of 2^k points is the user's choice
@@ -134,4 +134,4 @@ class Sample:
 def _hypercube(keys: int, points: int, seed: int) -> Array:
     from scipy.stats import qmc
 
-    return qmc.LatinHypercube(keys, seed=np.random.default_rng(seed)).random(points)
+    return qmc.LatinHypercube(keys, rng=np.random.default_rng(seed)).random(points)

@@ -1,6 +1,7 @@
 """A sweep: many designs, one question, one dataset."""
 
 import os
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,7 +76,7 @@ class Sweep:
         question = Question.of(ask)
         question.check(system)
         if motion is not None:
-            system.motion_of(motion, **({} if tell is None else {"tell": tell}))
+            system.motion_of(motion, tell=tell or warnings.warn)
         plain = Job(
             path=system.files[0].absolute(),
             text=system.text,
