@@ -117,6 +117,13 @@ def test_the_command_line_says_it_first_and_in_json(tmp_path, cli):
     assert json.loads(out)["warnings"] == []
 
 
+def test_a_posture_is_told_the_same_as_a_motion_of_one_instant(anymal):
+    lifted = bent(anymal, "LF", -0.4)
+    assert lifted.warnings() != ()
+    assert lifted.warnings(lifted.still()) == lifted.warnings()
+    assert anymal.warnings(lifted.still()) == lifted.warnings()
+
+
 def walked(system, *, lifted):
     """A motion in which the base moves 0.2 m ahead over feet that hold; without its feet for a
     while if they are lifted."""
