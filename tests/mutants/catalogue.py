@@ -455,9 +455,11 @@ MUTANTS = [
     ),
     *_of(
         "design", "design/_standing.py",
-        ("if not any(sets):", "if False:", "free fall"),
+        ("if not any(motion.contact_sets):", "if False:", "free fall"),
         ("np.sort(heights)[(len(heights) - 1) // 2]", "heights.min()", "a foot below the others"),
         ("outside > _OUTSIDE", "outside > 1.0", "centre of mass outside the feet"),
+        ("if farthest > _APART:", "if False:", "feet that move while they hold"),
+        ("if len(motion) > 1:", "if True:", "one instant is a posture"),
     ),
     *_of(
         "design", "design/_certify.py",

@@ -93,10 +93,18 @@ def test_soles_reach_as_far_as_simulation_says(anymal):
         assert bool(design.warnings()) is warns
 
 
-def test_along_a_motion_only_missing_contacts_are_told(anymal):
+def test_along_a_motion_heights_of_feet_are_not_told(anymal):
     lifted = bent(anymal, "LF", -0.4)
     assert lifted.warnings() != ()
-    assert lifted.warnings(lifted.still()) == ()
+    still = lifted.still()
+    twice = replace(
+        still,
+        time=np.array([0.0, 1.0]),
+        q=np.repeat(still.q, 2, axis=0),
+        v=np.repeat(still.v, 2, axis=0),
+        contact_index=np.zeros(2, dtype=np.int64),
+    )
+    assert lifted.warnings(twice) == ()
 
 
 def test_a_fixed_base_needs_no_feet():
@@ -115,6 +123,13 @@ def test_the_command_line_says_it_first_and_in_json(tmp_path, cli):
     assert said.startswith("panda flies")
     _, out, _ = cli("certify", EXAMPLES / "panda.toml", "--out", tmp_path / "d.json", "--json")
     assert json.loads(out)["warnings"] == []
+
+
+def test_a_posture_is_told_the_same_as_a_motion_of_one_instant(anymal):
+    lifted = bent(anymal, "LF", -0.4)
+    assert lifted.warnings() != ()
+    assert lifted.warnings(lifted.still()) == lifted.warnings()
+    assert anymal.warnings(lifted.still()) == lifted.warnings()
 
 
 def walked(system, *, lifted):

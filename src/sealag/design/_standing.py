@@ -1,11 +1,11 @@
 """Whether a design stands: what its contacts and its centre of mass say before any certificate."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from sealag.design._design import Design
-from sealag.robot import ContactKind, Motion
+from sealag.robot import Contact, ContactKind, Motion
 from sealag.typing import Array
 
 _APART = 0.01  # m: soles and toes of one posture differ by less, a lifted foot by more
@@ -19,32 +19,35 @@ def standing_warnings(design: Design, motion: Motion | None) -> tuple[str, ...]:
     """Return what keeps a floating-base robot from standing as its design says.
 
     A certificate holds for the contacts that the design states, wherever they are; these sentences
-    say where that is not what a person would mean. Along a motion feet may stand on steps and the
-    centre of mass may be anywhere: contacts that are missing altogether are told, and those that
-    move while they hold.
+    say where that is not what a person would mean. One instant is a posture. Along more, feet may
+    stand on steps and the centre of mass may be anywhere: contacts that are missing altogether are
+    told, and those that move while they hold.
 
     Args:
         design: the robot, its contacts and its posture.
-        motion: what is certified instead of the posture, or None.
+        motion: what is certified; the posture if None.
     """
     if not design.robot.floating_base:
         return ()
-    sets = (design.contacts,) if motion is None else motion.contact_sets
-    if not any(sets):
+    motion = motion or design.still()
+    if not any(motion.contact_sets):
         return (
             f"{design.robot.name} flies: its base is floating and nothing holds it to the ground, "
             "so that all of this is about free fall; give [[contacts]], or base = \"fixed\" in "
             "[robot] for a robot that is held",
         )  # fmt: skip
-    return tuple(_of_posture(design) if motion is None else _of_motion(design, motion))
+    if len(motion) > 1:
+        return tuple(_of_motion(design, motion))
+    contacts = motion.contact_sets[motion.contact_index[0]]
+    return tuple(_of_posture(design, motion.q[0], contacts)) if contacts else ()
 
 
-def _of_posture(design: Design) -> Iterator[str]:
-    robot, q = design.robot, design.posture
-    placed = [robot.frame_placement(contact.frame, q) for contact in design.contacts]
+def _of_posture(design: Design, q: Array, contacts: Sequence[Contact]) -> Iterator[str]:
+    robot = design.robot
+    placed = [robot.frame_placement(contact.frame, q) for contact in contacts]
     heights = np.array([position[2] for _, position in placed])
     level = np.sort(heights)[(len(heights) - 1) // 2]
-    for contact, over in zip(design.contacts, (heights - level).tolist(), strict=True):
+    for contact, over in zip(contacts, (heights - level).tolist(), strict=True):
         if abs(over) > _APART:
             where = "above" if over > 0.0 else "below"
             yield (
@@ -52,7 +55,7 @@ def _of_posture(design: Design) -> Iterator[str]:
                 "there all the same; correct the posture, or leave it out of [[contacts]]"
             )
     com = robot.center_of_mass(q)
-    outside = _distance(com[:2], _support(design, placed))
+    outside = _distance(com[:2], _support(design, contacts, placed))
     if outside > _OUTSIDE:
         yield (
             f"the centre of mass is {outside:.3f} m outside the feet, at x = {com[0]:.3f} m and "
@@ -83,11 +86,13 @@ def _of_motion(design: Design, motion: Motion) -> Iterator[str]:
             )
 
 
-def _support(design: Design, placed: list[tuple[Array, Array]]) -> Array:
+def _support(
+    design: Design, contacts: Sequence[Contact], placed: list[tuple[Array, Array]]
+) -> Array:
     """Points (k, 2) whose hull the feet cover, m."""
     setting, points = design.simulation, []
     half = _CORNERS * [setting.foot_half_length, setting.foot_half_width]
-    for contact, (rotation, position) in zip(design.contacts, placed, strict=True):
+    for contact, (rotation, position) in zip(contacts, placed, strict=True):
         if contact.kind is ContactKind.SURFACE:
             points.append(position[:2] + half @ rotation[:2, :2].T)
         else:
