@@ -123,7 +123,8 @@ def _show(tuned: Any, path: Path | None) -> None:
             "tuned" if tuned.found else "not tuned",
             f"{question.aim} for the {question.number} number",
         ),
-        ("required", f"{time_text(question.required)} of {time_text(question.system.delays.d_1)}"),
+        ("delay of the design", time_text(question.system.delays.d_1)),
+        ("required", time_text(question.required)),
         ("reached", time_text(tuned.reached_s)),
     ]
     if tuned.scale is not None:
