@@ -34,7 +34,7 @@ def test_arrays_that_can_be():
 QUESTIONS = {
     "criterion": (sealag.certify, {"criterion": "x"}),
     "proofs": (sealag.certify, {"proofs": 1.5}),
-    "motion": (sealag.certify, {"motion": "walk.csv"}),
+    "motion": (sealag.certify, {"motion": 3.5}),
     "seed": (sealag.simulate, {"seed": -1}),
     "whole number": (sealag.simulate, {"seed": 1.5}),
     "duration": (sealag.simulate, {"duration": float("nan")}),
