@@ -161,8 +161,8 @@ def _stiffest(question: Question) -> Tuned:
         )
 
     tuned = at(1.0)
-    if tuned.found or tuned.binding is None:
-        return tuned
+    if tuned.found or (tuned.binding is None and not at(_SHARES[-1]).found):
+        return tuned  # in the second case a condition fails whatever the gains
     share = _stable_share(lambda share: at(share).found)
     return tuned if share is None else at(share, "stability")
 
