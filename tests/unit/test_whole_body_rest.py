@@ -10,7 +10,7 @@ from helpers.small_systems import arm, arm_system, joint_task
 from sealag.design import load
 from sealag.robot import Contact
 from sealag.simulation import Outcome
-from sealag.whole_body import GravityCompensation, Law, Signal
+from sealag.whole_body import GravityCompensation, Law, MotorAngles, Signal
 
 HUME = load("bundled:hume")
 GAIN = 30.0
@@ -142,3 +142,21 @@ def test_a_softer_law_sags_more(tmp_path):
     system = system_of(tmp_path, "motor", GravityCompensation.NONE)
     soft = replace(system, law=replace(system.law, tasks=(joint_task(system.robot, 0.5 * GAIN),)))
     assert soft.rest().moved > 1.2 * system.rest().moved
+
+
+def test_a_task_far_stiffer_than_the_springs_is_an_answer_and_no_failure(tmp_path):
+    """Motor angles that hold the links are searched in steps that grow without bound there."""
+    robot = arm_system(tmp_path, count=2).robot
+    law = Law(
+        tasks=(joint_task(robot, 1e9 * np.eye(2)),),
+        stiffness_form="force",
+        signal=MotorAngles(),
+        gravity="none",
+    )
+    system = arm_system(
+        tmp_path, robot=robot, law=law, count=2, springs={"spring_stiffness": 50.0},
+        posture=np.array([0.3, 0.4]),
+    )  # fmt: skip
+    rest = system.rest(system.still())
+    assert np.isfinite(rest.theta).all()
+    assert rest.found or rest.reason

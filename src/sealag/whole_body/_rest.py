@@ -26,6 +26,7 @@ _AT_POSTURE = 1e-7
 ten times smaller refuses postures given with seven digits; ten times larger accepts a push."""
 
 _PLACED = 1e-12  # m, rad: how far a contact may be from where the posture has it
+_ASTRAY = 1e3  # m, rad: a search for motor angles that steps so far has gone away
 _ROUNDS = 60
 _LONGEST_STEP = 0.2  # rad: a longer Newton step leaves the region where its direction is good
 _HALVINGS = 12
@@ -210,8 +211,11 @@ class _Search:
             for _ in range(_ROUNDS):
                 self._signal.settled(self._posture, theta, out)
                 theta, last = joints + out / self._K, theta
-                if np.abs(theta - last).max(initial=0.0) < _PLACED:
+                step = np.abs(theta - last).max(initial=0.0)
+                if step < _PLACED:
                     return theta
+                if not step < _ASTRAY:  # a task that is stiffer than the springs drives it away
+                    break
         except ContractionError:
             pass
         return self._first(self._posture)
