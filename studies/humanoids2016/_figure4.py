@@ -265,9 +265,9 @@ def figure_4_claims(figure: Figure4, table: RandomPlantTable) -> tuple[Claim, ..
             source="Section IV, Theorem 1",
             published="The inequality (29) is sufficient for the passivity of the delayed loop.",
             computed=(
-                f"Of {table.presupposed} random plants under the paper's law (29) allows "
-                f"{table.published_longer} a delay at which the exact loop is unstable, the "
-                f"certified criterion {table.certified_longer} of all {table.plants}. Of "
+                f"On {table.published_longer} of {table.presupposed} random plants under the "
+                "paper's law (29) allows a delay at which the exact loop is unstable, the "
+                f"certified criterion on {table.certified_longer} of all {table.plants}. Of "
                 f"{len(figure.certified)} ways to run the same gains "
                 f"on Hume it refuses {len(refused)}: {'; '.join(refused)}."
             ),
