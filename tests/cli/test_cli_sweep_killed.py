@@ -27,6 +27,7 @@ def begun(folder, project, name):
     return subprocess.Popen(
         [sys.executable, "-m", "sealag", "sweep", project, *OVER, "--jobs", "2", "--out", name],
         cwd=folder, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # also in the background
     )  # fmt: skip
 
 
