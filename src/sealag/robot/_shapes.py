@@ -10,7 +10,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+from sealag.errors import SealagError
 from sealag.robot._document import read_document
+from sealag.robot._find import resolve_urdf
 from sealag.robot._urdf import number
 from sealag.typing import Array
 
@@ -90,21 +92,14 @@ class Shapes:
             return None
 
     def _file(self, name: str) -> Path | None:
-        """A mesh's file: relative to the URDF, or to the folder of a package above it."""
-        name = name.removeprefix("file://")
-        if name.startswith("package://"):
-            name = name.removeprefix("package://")
-            places = [folder / name for folder in self._folder.parents]
-        else:
-            places = [self._folder / name]
-        for path in places:
-            try:
-                status = path.stat()
-            except (OSError, ValueError):
-                continue
-            if stat.S_ISREG(status.st_mode) and 0 < status.st_size <= _LARGEST_MESH:
-                return path
-        return None
+        """A mesh's file, as a URDF names it; None if it is not there, or too large to read."""
+        try:
+            path = resolve_urdf(name.removeprefix("file://"), relative_to=self._folder)
+            status = path.stat()
+        except (SealagError, OSError, ValueError):
+            return None
+        regular = stat.S_ISREG(status.st_mode) and 0 < status.st_size <= _LARGEST_MESH
+        return path if regular else None
 
 
 def _primitive(element: ElementTree.Element) -> Balls | None:
