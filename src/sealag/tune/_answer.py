@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from sealag.design import System, certify
-from sealag.errors import ContractionError, SolverError
+from sealag.errors import ContractionError, InputError, SolverError
 from sealag.passivity import Certificate, Criterion, Status
+from sealag.tune._findings import Index, Point, Replaced
 from sealag.tune._question import Aim, Number, Question, pd_keys
 from sealag.tune._room import transparency_of
 from sealag.tune._write import as_file, kd_of_file
@@ -25,7 +26,8 @@ class Binding:
     """What stops a gain.
 
     Attributes:
-        kind: "delay"; "transparency" where its limit keeps damping away that the delay asks for;
+        kind: "delay"; "index" where the quadratic index is least; "transparency" where its limit
+            keeps damping away that the delay asks for;
             "period" or "noise" where it bounds the shaping; "spring" where the springs have more of
             the limiting compliance; "stability" where the loop loses its stability before its
             passivity, or even without delay.
@@ -59,13 +61,17 @@ class Tuned:
         scale: common factor of the old stiffness; None for other aims and shares.
         limit: at the boundary itself: the common factor, the mean of the groups' factors, the
             bandwidth (rad/s), the cost of the damping (Nms/rad, or J), or by how much less than
-            the passive damping a margin needs; None where nothing bounds it.
+            the passive damping a margin needs, or the quadratic index; None where nothing bounds
+            it.
         bandwidth_rad_s: of joint PD; None for other aims.
         factors: of each group of gains; empty for other aims.
         binding: what stops the gains; None where they reach no delay.
         certificate: of the design with the gains, or with those that fail whatever they are; None
             if none were tried.
         reasons: why the delay is not reached, in words.
+        mapping: how well drives replace the controller's damping; None for other aims.
+        index: the quadratic index; None for other aims.
+        front: designs that no other one beats; empty for other aims.
     """
 
     question: Question
@@ -79,6 +85,9 @@ class Tuned:
     binding: Binding | None = None
     certificate: Certificate | None = None
     reasons: tuple[str, ...] = ()
+    mapping: Replaced | None = None
+    index: Index | None = None
+    front: tuple[Point, ...] = ()
 
     @classmethod
     def none(cls, question: Question, *reasons: str) -> "Tuned":
@@ -141,6 +150,21 @@ class Tuned:
             **known,
         )
 
+    def pick(self, number: int) -> "Tuned":
+        """Return the certified design of a point of the front.
+
+        Args:
+            number: of the point.
+
+        Raises:
+            InputError: there is no such point.
+        """
+        if not 1 <= number <= len(self.front):
+            raise InputError(f"The front has no point {number}; it has 1 … {len(self.front)}.")
+        point = self.front[number - 1]
+        design = Tuned.of(self.question, point.system, scale=point.scale)
+        return replace(design, front=self.front)
+
     def gains(self) -> dict[str, Any]:
         """Return the design's gains by the names that its project file has for them."""
         law, joints = self.system.law, self.system.robot.joints
@@ -160,6 +184,7 @@ class Tuned:
     def summary(self) -> dict[str, Any]:
         """Return everything as JSON says it: None for what is not known or does not exist."""
         asked, reached, certificate = self.question, self.reached_s, self.certificate
+        joints = self.system.robot.joints
         return {
             "found": self.found,
             "aim": asked.aim.value,
@@ -176,6 +201,9 @@ class Tuned:
             "limits": dict(asked.limits),
             "transparency": transparency_of(asked, self.system),
             "binding": None if self.binding is None else asdict(self.binding),
+            "mapping": None if self.mapping is None else self.mapping.summary(joints),
+            "index": None if self.index is None else asdict(self.index),
+            "front": [point.summary() for point in self.front],
             "certificate": None if certificate is None else certificate.summary(),
             "reasons": list(self.reasons),
         }

@@ -36,7 +36,7 @@ class Knobs:
         self.question = question
         self.system = system
         self.groups: tuple[Group, ...] = groups_of(system.law, system.robot, question.share)
-        self._parts = parts_of(system, self.groups, question.motion)
+        self.parts = parts_of(system, self.groups, question.motion)
         held = system.spaces(question.motion).F_gravity
         self._held = (held + np.swapaxes(held, -1, -2)) / 2.0
 
@@ -50,7 +50,7 @@ class Knobs:
         series = self.system.law.signal.limits(
             drives.spring_stiffness, delay / drives.motor_damping
         )
-        return Limits(parts=self._parts, held=self._held, series=series)
+        return Limits(parts=self.parts, held=self._held, series=series)
 
     def stiffest(self, delay: float) -> tuple[Array, Wall]:
         """Return the factors (G,) at their limit for a delay, and what stops them.
