@@ -13,7 +13,7 @@ from sealag.sweep._axis import Axis, Choices
 from sealag.sweep._cluster import on_cluster
 from sealag.sweep._dataset import Dataset
 from sealag.sweep._job import ERROR, KIND, POINT, Job, asked, digest_of
-from sealag.sweep._plot import draw, ending_of
+from sealag.sweep._plot import draw
 from sealag.sweep._question import Question
 from sealag.sweep._sample import Sample
 from sealag.sweep._swept import Swept, summed_up
@@ -165,18 +165,6 @@ class Sweep:
             FileError: the picture cannot be written.
         """
         draw(self.dataset(folder), self.sample, self.job.question, path)
-
-    @staticmethod
-    def check_plot(path: Path) -> None:
-        """Refuse a picture that could not be drawn, before anything is computed.
-
-        Args:
-            path: the picture.
-
-        Raises:
-            InputError: its ending is none of a picture's.
-        """
-        ending_of(path)
 
     def dataset(self, folder: Path) -> Dataset:
         """Return the sweep's dataset in a folder.

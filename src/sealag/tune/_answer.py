@@ -1,6 +1,6 @@
 """From gains to an answer: the number that they reach, what stops them, the certificate."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -9,16 +9,13 @@ import numpy as np
 from sealag.design import System, certify
 from sealag.errors import ContractionError, InputError, SolverError
 from sealag.passivity import Certificate, Criterion, Status
+from sealag.tune._curve import number_along
 from sealag.tune._findings import Index, Point, Replaced
 from sealag.tune._question import Aim, Number, Question, pd_keys
 from sealag.tune._room import transparency_of
 from sealag.tune._write import as_file, kd_of_file
 from sealag.typing import Array
 from sealag.units import time_text
-
-_SURELY = 1e-3
-"""1/s: growth that no rounding of a loop's zero roots makes. Slower growth is left to the margin's
-own decision, which takes longer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,6 +162,20 @@ class Tuned:
         design = Tuned.of(self.question, point.system, scale=point.scale)
         return replace(design, front=self.front)
 
+    def tolerated(self, shares: Sequence[float]) -> Array:
+        """Return the question's number of the gains times each share, (N,) s; NaN where not known.
+
+        Shares are those of the stiffness; of the damping where the least was asked for, and of the
+        bandwidth of joint PD at its damping ratio.
+
+        Args:
+            shares: positive factors.
+
+        Raises:
+            InputError: shaping was asked for, of which no delay depends.
+        """
+        return number_along(self.question, self.system, shares)
+
     def gains(self) -> dict[str, Any]:
         """Return the design's gains by the names that its project file has for them."""
         law, joints = self.system.law, self.system.robot.joints
@@ -207,55 +218,6 @@ class Tuned:
             "certificate": None if certificate is None else certificate.summary(),
             "reasons": list(self.reasons),
         }
-
-
-def passive_bound(question: Question, system: System) -> float:
-    """Return the smallest passive bound of a design along the question's motion, s.
-
-    Args:
-        question: along which motion.
-        system: the design.
-    """
-    return float(_bounds(question, system).min())
-
-
-def _bounds(question: Question, system: System) -> Array:
-    """The passive bound of each instant (N,), s."""
-    return system.certified_bounds(system.spaces(question.motion), None, question.motion).delay
-
-
-def number_of(question: Question, system: System) -> tuple[float | None, str]:
-    """Return the delay that counts of a design, s, and what stands in its way.
-
-    Args:
-        question: which number, along which motion.
-        system: the design.
-
-    Returns:
-        The delay, None if not known; and "delay", "spring" or "stability".
-    """
-    if question.number is Number.PASSIVE:
-        return passive_bound(question, system), "delay"
-    try:
-        if _unstable(question, system):  # its crossings, which nobody asks for, can take minutes
-            return 0.0, "stability"
-        if question.number is Number.CONSTANT:
-            local = system.local(_bounds(question, system), question.motion)
-            return local.margin_s, "stability" if local.unstable_modes else "delay"
-        margins = system.local_margins(question.motion)
-    except ContractionError:
-        return 0.0, "spring"
-    except SolverError:
-        return None, "delay"
-    return margins.jitter_s, "stability" if margins.unstable_modes else "delay"
-
-
-def _unstable(question: Question, system: System) -> bool:
-    """Whether the first instant is surely unstable without delay where it is held."""
-    motion = question.motion
-    loop = system.frozen(motion, 0, rest=system.in_posture(motion, 0))
-    rightmost = loop.roots(0.0, count=1)
-    return bool(len(rightmost)) and float(rightmost.real.max()) > _SURELY
 
 
 def _of(question: Question, margins: Any) -> float | None:

@@ -7,9 +7,10 @@ import numpy as np
 from sealag.design import System
 from sealag.errors import InputError
 from sealag.robot import Motion
-from sealag.tune._answer import Tuned, number_of
+from sealag.tune._answer import Tuned
 from sealag.tune._findings import Replaced
 from sealag.tune._gains import rounded
+from sealag.tune._numbers import number_of
 from sealag.tune._question import Number, Question
 from sealag.typing import Array
 from sealag.whole_body import GravityCompensation, Law, StiffnessForm, Task, TaskKind
