@@ -137,7 +137,7 @@ def test_riccatis_index_lies_below_what_one_gain_for_all_reaches(tmp_path):
 
 def test_weights_are_asked_for(tmp_path):
     system = design(tmp_path, MotorAngles())
-    with pytest.raises(InputError, match="--limit error=0.02 --limit torque=30Nm"):
+    with pytest.raises(InputError, match=r"--limit error=0.02 --limit torque=30Nm"):
         tune(system, aim="optimal", limits={"error": 0.1})
     with pytest.raises(InputError, match="limit torque is for --aim optimal, not for stiffness"):
         tune(system, limits={"torque": 1.0})

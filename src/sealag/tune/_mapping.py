@@ -67,7 +67,7 @@ def _central(system: System, motion: Motion | None) -> Array:
 
 def _consistent(system: System, motion: Motion | None) -> Array:
     """Π (N, n, n): what the contacts leave of joint rates, J* of a task that holds all joints."""
-    joints = Task(name="joints", kind=TaskKind.POSTURE, stiffness=1.0)
+    joints = Task(name="joints", kind=TaskKind.POSTURE, stiffness=np.ones(system.robot.n))
     law = Law(
         tasks=(joints,),
         gravity=GravityCompensation.PLANNED,

@@ -10,7 +10,7 @@ import tomlkit
 from sealag.design import System, load
 from sealag.toml import table_in, text_of
 from sealag.tune._question import pd_keys
-from sealag.typing import Array
+from sealag.typing import Array, ArrayLike
 
 
 def as_file(before: System, after: System) -> System:
@@ -53,7 +53,7 @@ def as_file(before: System, after: System) -> System:
     return replace(read, delays=after.delays)
 
 
-def _plain(values: Array) -> Any:
+def _plain(values: ArrayLike) -> Any:
     return np.asarray(values, dtype=float).tolist()
 
 
