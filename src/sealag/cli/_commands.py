@@ -179,7 +179,7 @@ def _sweep_rates(project: str, *, plot: Path | None, as_json: bool) -> None:
     system = design.load(project)
     check_picture(plot, *system.files)
     compile_kernels()
-    with busy("lifting sampled loops"):
+    with busy("sampling the loop at each rate"):
         rates = system.rate_sweep()
     if plot is not None:
         of_rates(rates, system.name).write(plot)
@@ -188,7 +188,8 @@ def _sweep_rates(project: str, *, plot: Path | None, as_json: bool) -> None:
         return
     show("rate          largest delay   proven          the design's, without the hold")
     for rate in rates:
-        largest = "not lifted" if rate.largest_s is None else time_text(rate.largest_s)
+        # too many commands wait for the exact loop: only the proven delay is known
+        largest = "not found" if rate.largest_s is None else time_text(rate.largest_s)
         verdict = {True: "stable", False: "unstable", None: "open"}[rate.stable]
         show(
             f"{rate.rate_hz:7.1f} Hz    {largest:15} {time_text(rate.proven_s):15} "
