@@ -5,7 +5,7 @@ from typing import Annotated, Unpack
 
 import typer
 
-from sealag.cli._options import Json, MotionFile, Plot, Project, ShownPoint, shown
+from sealag.cli._options import Json, MotionFile, Plot, Project, ShownGains, shown
 
 
 @shown
@@ -47,7 +47,7 @@ def tune(
         Path | None,
         typer.Option("--write", help="Project file that gets the gains: PROJECT, or one beside."),
     ] = None,
-    **how: Unpack[ShownPoint],
+    **how: Unpack[ShownGains],
 ) -> None:
     """Find gains for a delay and what stops them; status 1 if there are none."""
     from sealag.cli._tune import Outputs, tune_project

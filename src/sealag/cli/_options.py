@@ -52,20 +52,29 @@ class Shown(TypedDict):
     as_json: Json
 
 
-class ShownPoint(Shown):
-    """The same, of one point of a front.
+class ShownGains(Shown):
+    """The same of gains.
 
     Attributes:
-        pick: its number; None for none.
+        pick: number of a front's point; None for none.
+        allow_unstable: whether passive gains count that hold no equilibrium.
     """
 
     pick: Annotated[
         int | None,
         typer.Option("--pick", help="Point of --aim front that is certified and written."),
     ]
+    allow_unstable: Annotated[
+        bool,
+        typer.Option(
+            "--allow-unstable",
+            help="Take gains that are passive only, as of a walk on point feet: you stabilise it "
+            "by other means.",
+        ),
+    ]
 
 
-_DEFAULTS = {"plot": None, "as_json": False, "pick": None}
+_DEFAULTS = {"plot": None, "as_json": False, "pick": None, "allow_unstable": False}
 
 
 def shown(command: Callable[..., None]) -> Callable[..., None]:

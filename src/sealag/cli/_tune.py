@@ -34,12 +34,14 @@ class Outputs(TypedDict):
         write: project file that gets the gains; None for none.
         pick: number of the front's point that counts; None for none.
         plot: picture; None for none.
+        allow_unstable: whether passive gains count that hold no equilibrium.
         as_json: whether one JSON object is all that is printed.
     """
 
     write: Path | None
     pick: int | None
     plot: Path | None
+    allow_unstable: bool
     as_json: bool
 
 
@@ -78,20 +80,20 @@ def tune_project(
         tuned = tune(system, along, aim=word, limits=allowed, delay=delay, **goals, **asked)
         if pick is not None and tuned.front:
             tuned = tuned.pick(pick)
-        if plot is not None and tuned.found:
+        good = tuned.found or (outputs["allow_unstable"] and tuned.passive_only)
+        plot = plot if good else None
+        if plot is not None:
             of_gains(tuned).write(plot)
-    if not tuned.found:
-        plot = None
-    written = write if tuned.found else None
+    written = write if good else None
     if written is not None:
         write_text(written, tuned.system.text)
     if outputs["as_json"]:
         names = {"written": None if written is None else str(written)}
         show_json({**tuned.summary(), **names, **drawn(plot)})
     else:
-        _show(tuned, written)
+        _show(tuned, written, good=good)
         show_picture(plot)
-    return 0 if tuned.found else 1
+    return 0 if good else 1
 
 
 def _aim(aim: str) -> tuple[str, dict[str, float]]:
@@ -146,12 +148,12 @@ def _check_target(path: Path, system: System, motion: Path | None, delay: float 
         )
 
 
-def _show(tuned: Any, path: Path | None) -> None:
+def _show(tuned: Any, path: Path | None, *, good: bool) -> None:
     """Show gains, what stops them and by how much."""
     question, binding = tuned.question, tuned.binding
     rows = [
         (
-            "tuned" if tuned.found else "not tuned",
+            "tuned" if good else "not tuned",
             f"{question.aim} for the {question.number} number",
         ),
         ("delay of the design", time_text(question.system.delays.d_1)),
@@ -166,7 +168,7 @@ def _show(tuned: Any, path: Path | None) -> None:
         rows += [(f"  factor of {name}", f"{value:.6g}") for name, value in tuned.factors.items()]
     if binding is not None:
         rows += [(name, _gain(value)) for name, value in tuned.gains().items()]
-    if tuned.found:
+    if good:
         rows.append(("promised", _PROMISES[question.number]))
         rows += _transparency(tuned)
     if tuned.certificate is not None:
@@ -193,7 +195,7 @@ def _show(tuned: Any, path: Path | None) -> None:
     for name, value in rows:
         show(f"{name:26} {value}")
     for reason in tuned.reasons:
-        show(f"not tuned because {reason}")
+        show(f"{'passive only' if good else 'not tuned'} because {reason}")
 
 
 def _findings(tuned: Any) -> list[tuple[str, str]]:

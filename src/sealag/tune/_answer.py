@@ -147,6 +147,19 @@ class Tuned:
             **known,
         )
 
+    @property
+    def passive_only(self) -> bool:
+        """Whether the gains are passive as required and no equilibrium is shown to be stable: a walk
+        on point feet, which something else must hold."""
+        certificate, reached = self.certificate, self.reached_s
+        return (
+            self.question.number is Number.PASSIVE
+            and certificate is not None
+            and certificate.answer.status is Status.PASSIVE_ONLY
+            and reached is not None
+            and reached >= self.question.required
+        )
+
     def pick(self, number: int) -> "Tuned":
         """Return the certified design of a point of the front.
 

@@ -93,7 +93,8 @@ def damped(question: Question, delay: float, room: Room) -> tuple[System, float]
     """
     system, motion = question.system, question.motion
     spaces = system.spaces(motion)
-    if not (np.isfinite(spaces.F_theta).all() and (spaces.contraction < 1.0).all()):
+    # q̄(θ) needs springs that are stiffer than the tasks; motor angles do not.
+    if not np.isfinite(spaces.F_theta).all() or system.law.signal.refusal(spaces.contraction):
         return "the tasks are stiffer than the springs; tune the stiffness first"
     F = (spaces.F_theta + np.swapaxes(spaces.F_theta, -1, -2)) / 2.0
     root = np.sqrt(room.most)
