@@ -149,8 +149,8 @@ class Tuned:
 
     @property
     def passive_only(self) -> bool:
-        """Whether the gains are passive as required and no equilibrium is shown to be stable: a walk
-        on point feet, which something else must hold."""
+        """Whether the gains are passive as required and no equilibrium is shown to be stable, as of
+        a walk on point feet, which something else must hold."""
         certificate, reached = self.certificate, self.reached_s
         return (
             self.question.number is Number.PASSIVE
