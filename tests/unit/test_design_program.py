@@ -60,7 +60,7 @@ def test_its_margins_are_those_of_the_same_law(tmp_path):
 
 
 def test_it_runs_in_the_simulator(tmp_path):
-    run = load(project(tmp_path)).simulate(scenario="regulate", duration=0.1)
+    run = sealag.simulate(load(project(tmp_path)), scenario="regulate", duration=0.1)
     assert run.outcome is Outcome.COMPLETED
     np.testing.assert_allclose(run.v, 0.0, atol=1e-6)
     assert run.audit.controller_side is None  # it states no potential
@@ -77,7 +77,7 @@ def test_what_needs_a_law_is_refused(tmp_path, ask):
     questions = {
         "certify": lambda: sealag.certify(system),
         "spaces": system.spaces,
-        "track": lambda: system.simulate(scenario="track", duration=0.1),
+        "track": lambda: sealag.simulate(system, scenario="track", duration=0.1),
     }
     with pytest.raises(InputError, match=r"the controller of arm is a program"):
         questions[ask]()

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from sealag.design import System, certify, simulate
+from sealag.design import System, simulate
 from sealag.errors import InputError, either, word
+from sealag.passivity import Answer
+from sealag.robot import Motion
 from sealag.simulation import Outcome, Run
 from sealag.tune import tune
 from sealag.units import number_of
@@ -18,6 +20,9 @@ from sealag.units import number_of
 _TUNE = ("aim", "number", "share", "safety", "damping_ratio")
 """What `tune` can be told besides: words, then numbers."""
 _TUNE_NUMBERS = ("safety", "damping_ratio")
+
+
+ToDelays = Callable[[System], dict[str, Any]]
 
 
 class Ask(StrEnum):
@@ -100,33 +105,44 @@ class Question:
         """The column whose words are counted."""
         return _VERDICTS[self.ask]
 
-    def answer(self, system: System, motion: Path | None) -> dict[str, Any]:
-        """Ask a design.
+    @property
+    def of_motions(self) -> bool:
+        """Whether it is asked along a motion."""
+        return self.ask is not Ask.SIMULATE
+
+    @property
+    def spans_delays(self) -> bool:
+        """Whether what is prepared for a law serves it with other delays too."""
+        return self.ask in (Ask.CERTIFY, Ask.MARGIN)
+
+    def prepared(self, system: System, along: Motion | None) -> ToDelays:
+        """Compute what an answer rests on besides the delays of both connections.
 
         Args:
             system: the design.
-            motion: a motion's file, or None.
+            along: a motion; None for the posture.
 
         Returns:
-            By column; a time that no delay reaches is inf, what is not known None.
+            A function of the design, or of one with other delays if the question `spans_delays`: an
+            answer by column; a time that no delay reaches is inf, what is not known None.
 
         Raises:
-            SealagError: the command would refuse it.
+            SealagError: the command would refuse it; so the function.
         """
-        if self.ask is Ask.SIMULATE:
-            return _run(system)
-        along = None
-        if motion is not None or system.motion_file is not None:
-            along = system.motion_of(motion, tell=_nothing)
-        return _ANSWERS[self.ask](system, along, self.options)
+        match self.ask:
+            case Ask.CERTIFY:
+                findings = system.findings(along)
+                return lambda system: _certified(system, findings.confirmed(system.delays).answer)
+            case Ask.MARGIN:
+                found = _margin(system, along)
+                return lambda _: found
+            case Ask.TUNE:
+                return lambda system: _tune(system, along, self.options)
+            case Ask.SIMULATE:
+                return _run
 
 
-def _nothing(_: str) -> None:
-    """What was left out of a motion is said once, before the sweep."""
-
-
-def _certify(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]:
-    answer = certify(system, along).confirmed().answer
+def _certified(system: System, answer: Answer) -> dict[str, Any]:
     return {
         "status": answer.status.value,
         "max_delay_s": answer.max_delay_s,
@@ -142,7 +158,7 @@ def _certify(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]
     }
 
 
-def _margin(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]:
+def _margin(system: System, along: Motion | None) -> dict[str, Any]:
     found = system.local_margins(along)
     return {
         "passive_s": found.passive_s,
@@ -158,7 +174,7 @@ def _margin(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _tune(system: System, along: Any, options: Mapping[str, Any]) -> dict[str, Any]:
+def _tune(system: System, along: Motion | None, options: Mapping[str, Any]) -> dict[str, Any]:
     tuned = tune(system, along, **options)
     binding = tuned.binding
     return {
@@ -197,12 +213,6 @@ def _largest(shares: Mapping[str, float]) -> str | None:
     """The joint with the largest share; None where there is none."""
     return max(shares, key=lambda name: shares[name]) if shares else None
 
-
-_ANSWERS: dict[Ask, Callable[..., dict[str, Any]]] = {
-    Ask.CERTIFY: _certify,
-    Ask.MARGIN: _margin,
-    Ask.TUNE: _tune,
-}
 
 _COLUMNS: dict[Ask, dict[str, type]] = {
     Ask.CERTIFY: {
