@@ -86,6 +86,13 @@ def test_designs_that_differ_in_delays_share_what_is_computed(project, tmp_path,
     for row in rows.to_dict("records"):
         same_as_certify(row, edited(project, row[HAND], row[DELAY]), path)
     assert len(set(rows["status"])) > 1
+    bounds = rows_of(
+        Sweep.of(project, (f"{DELAY}=1,4,80,1000", f"{HAND}=20,80,5000"), motion=path, ask="bound"),
+        tmp_path / "b", jobs=1,
+    )  # fmt: skip
+    same = ["max_delay_s", "delay_s", "limiting_joint", "worst_instant", "worst_time_s"]
+    pandas.testing.assert_frame_equal(bounds[same], rows[same], check_exact=True)
+    assert bounds["passive"].tolist() == (rows["max_delay_s"] >= rows["delay_s"]).tolist()
     margins = rows_of(
         Sweep.of(project, (f"{DELAY}=1,4", f"{HAND}=20,80"), motion=path, ask="margin"),
         tmp_path / "m", jobs=1,

@@ -26,9 +26,11 @@ ToDelays = Callable[[System], dict[str, Any]]
 
 
 class Ask(StrEnum):
-    """The command whose answer every point has."""
+    """The command whose answer every point has; the bound is the part of `certify` that has a
+    closed form."""
 
     CERTIFY = "certify"
+    BOUND = "bound"
     MARGIN = "margin"
     TUNE = "tune"
     SIMULATE = "simulate"
@@ -48,7 +50,7 @@ class Question:
 
     @classmethod
     def of(cls, text: str) -> "Question":
-        """Read certify, margin, simulate, tune, or tune:aim=damping,number=jitter.
+        """Read certify, bound, margin, simulate, tune, or tune:aim=damping,number=jitter.
 
         Args:
             text: the expression.
@@ -85,7 +87,7 @@ class Question:
         Raises:
             InputError: as the command would.
         """
-        if self.ask in (Ask.CERTIFY, Ask.TUNE):
+        if self.ask in (Ask.CERTIFY, Ask.BOUND, Ask.TUNE):
             system.require_law("Bounds and tuned gains are")
         if self.ask is Ask.SIMULATE:
             system.duration()
@@ -113,7 +115,7 @@ class Question:
     @property
     def spans_delays(self) -> bool:
         """Whether what is prepared for a law serves it with other delays too."""
-        return self.ask in (Ask.CERTIFY, Ask.MARGIN)
+        return self.ask in (Ask.CERTIFY, Ask.BOUND, Ask.MARGIN)
 
     def prepared(self, system: System, along: Motion | None) -> ToDelays:
         """Compute what an answer rests on besides the delays of both connections.
@@ -133,6 +135,9 @@ class Question:
             case Ask.CERTIFY:
                 findings = system.findings(along)
                 return lambda system: _certified(system, findings.confirmed(system.delays).answer)
+            case Ask.BOUND:
+                bound = _bound(system, along)
+                return lambda system: _against(system.delays.d_1, bound)
             case Ask.MARGIN:
                 found = _margin(system, along)
                 return lambda _: found
@@ -156,6 +161,26 @@ def _certified(system: System, answer: Answer) -> dict[str, Any]:
         "worst_time_s": answer.worst.time_s,
         "reasons": "; ".join(answer.reasons),
     }
+
+
+def _bound(system: System, along: Motion | None) -> dict[str, Any]:
+    motion = system.still() if along is None else along
+    rest = system.rest(motion) if len(motion) == 1 else None
+    found = system.certified_bounds(system.spaces(motion), rest, motion)
+    worst = int(np.argmin(found.delay))
+    shares = np.abs(found.worst_motion(worst)) ** 2
+    return {
+        "max_delay_s": float(found.delay[worst]),
+        "limiting_joint": _largest(dict(zip(system.robot.joints, shares.tolist(), strict=True))),
+        "worst_instant": worst,
+        "worst_time_s": float(motion.time[worst]),
+        "reasons": "; ".join(found.refusals),
+    }
+
+
+def _against(delay: float, bound: dict[str, Any]) -> dict[str, Any]:
+    """A bound beside the design's delay, s."""
+    return {**bound, "passive": 0.0 < bound["max_delay_s"] >= delay, "delay_s": delay}
 
 
 def _margin(system: System, along: Motion | None) -> dict[str, Any]:
@@ -228,6 +253,15 @@ _COLUMNS: dict[Ask, dict[str, type]] = {
         "worst_time_s": float,
         "reasons": str,
     },
+    Ask.BOUND: {
+        "passive": bool,
+        "max_delay_s": float,
+        "delay_s": float,
+        "limiting_joint": str,
+        "worst_instant": int,
+        "worst_time_s": float,
+        "reasons": str,
+    },
     Ask.MARGIN: {
         "passive_s": float,
         "jitter_s": float,
@@ -270,6 +304,7 @@ _COLUMNS: dict[Ask, dict[str, type]] = {
 
 _HEADLINES = {
     Ask.CERTIFY: "max_delay_s",
+    Ask.BOUND: "max_delay_s",
     Ask.MARGIN: "delay_s",
     Ask.TUNE: "limit",
     Ask.SIMULATE: "deviation_rms",
@@ -277,6 +312,7 @@ _HEADLINES = {
 
 _VERDICTS = {
     Ask.CERTIFY: "status",
+    Ask.BOUND: "passive",
     Ask.MARGIN: None,
     Ask.TUNE: "found",
     Ask.SIMULATE: "outcome",

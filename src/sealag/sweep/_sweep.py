@@ -56,7 +56,7 @@ class Sweep:
             project: the project file, or `bundled:hume`.
             over: expressions KEY=1,2,5 or KEY=LOW:HIGH:log40 (lin40, int; without the number for
                 samples); KEY is a dotted path in the file, with places from 0 or names in lists.
-            ask: certify, margin, simulate, tune, or tune:aim=damping,number=jitter.
+            ask: certify, bound, margin, simulate, tune, or tune:aim=damping,number=jitter.
             motion: a motion's file; the project's own, or its posture, if None.
             sample: grid, lhs:POINTS, lhs:POINTS:SEED, or sobol likewise.
             tell: called with each sentence on what was left out of the motion.
