@@ -5,6 +5,7 @@ import sys
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from threadpoolctl import threadpool_info
@@ -37,11 +38,13 @@ from sealag.passivity import (
     Worst,
 )
 from sealag.robot import Motion
-from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.units import time_text
 from sealag.version import __version__
 from sealag.whole_body import Rest as Equilibrium
+
+if TYPE_CHECKING:
+    from sealag.simulation import Run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +113,7 @@ class _Case:
 
 def certify(
     project: System | str | Path,
-    motion: Motion | Run | str | Path | None = None,
+    motion: "Motion | Run | str | Path | None" = None,
     *,
     criterion: Criterion | str | None = None,
     time_varying: bool = False,

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sealag.design._project import loaded
-from sealag.design._simulate import run_design
 from sealag.design._system import System
-from sealag.simulation import Run
+
+if TYPE_CHECKING:
+    from sealag.simulation import Run
 
 
 def simulate(
@@ -18,7 +20,7 @@ def simulate(
     delay_scale: float = 1.0,
     log_period: float | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Run:
+) -> "Run":
     """Run a design's whole-body controller on the delayed robot, with contacts and energy audit.
 
     Scenarios: `regulate` holds the posture while the project's pushes act; `balance` does so with
@@ -47,6 +49,8 @@ def simulate(
             begins inside the ground, or the torque limits cannot hold the posture.
         FileError: the project file cannot be read.
     """
+    from sealag.design._simulate import run_design
+
     return run_design(
         loaded(project),
         scenario=scenario,
