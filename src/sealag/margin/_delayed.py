@@ -100,7 +100,9 @@ class DelayedLoop:
             confirm=confirm,
         )
 
-    def jitter_margin(self, channels: Mapping[str, Sequence[int]] | None = None) -> JitterMargin:
+    def jitter_margin(
+        self, channels: Mapping[str, Sequence[int]] | None = None, *, alone: bool = True
+    ) -> JitterMargin:
         """Largest delay below which d may vary as it likes; docs/theory section 7.4.
 
         Broken at y = R x with C = L R, the loop is y − y(t − τ) = w, w = Δ ẏ with
@@ -126,10 +128,11 @@ class DelayedLoop:
         Args:
             channels: rows of C by name, each row in one channel, whose delays vary independently,
                 each up to d; None for one delay of all.
+            alone: whether to bound also what each channel tolerates if only that is late.
 
         Returns:
-            The margin, at most that of `margin`, which is of constant delays only; of channels
-            also what each tolerates if only that is late.
+            The margin, at most that of `margin`, which is of constant delays only; with
+            each channel's own where channels are named.
 
         Raises:
             InputError: matrices do not fit or are not finite real numbers, a time is negative, or
@@ -140,8 +143,10 @@ class DelayedLoop:
         if channels is not None:
             rows = self._rows_of(channels)
             found = channel_margin(loop, Channels.of(loop, [self._side(at) for at in rows]))
-            alone = {name: self._only(at).jitter_margin().delay for name, at in zip(channels, rows)}
-            return replace(found, channels=alone)
+            if not alone:
+                return found
+            each = (self._only(at).jitter_margin().delay for at in rows)
+            return replace(found, channels=dict(zip(channels, each)))
         if broken.late < len(broken.right):
             return channel_margin(loop, Channels.of_broken(broken, loop.embedded_delay))
         return jitter_margin(loop, broken)

@@ -25,7 +25,8 @@ def exact_matrix(values: Array) -> "fmpq_mat":
     exact = values.dtype == object
     flat = values.ravel().tolist()
     entries = flat if exact else [fmpq(*value.as_integer_ratio()) for value in flat]
-    return fmpq_mat(*values.shape, entries)
+    rows, columns = values.shape
+    return fmpq_mat(rows, columns, entries)
 
 
 def enclosed(matrix: "fmpq_mat") -> "arb_mat":
