@@ -110,7 +110,7 @@ def test_each_channel_has_a_jitter_margin_and_both_ways_together(tmp_path):
     for name, alone in loop.channels().items():
         assert 0.3 * alone < ways[name] <= alone
     assert 0.4 * margin < ways["all"] <= ways["both ways"] <= ways["command"] * (1.0 + 1e-6)
-    late = loop.late_measurement(np.ones(len(loop.states), dtype=bool), weight=0.1)
+    late = loop.late_measurement(np.ones(len(loop.states), dtype=bool))
     assert late.margin().delay == pytest.approx(margin, rel=1e-9)
 
 

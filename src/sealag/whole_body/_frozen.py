@@ -151,9 +151,8 @@ class FrozenLoop(DelayedLoop):
 
         are late by a delay of their own: a command that is late by τ shows what was measured at
         t − τ − …, and delays that vary do not commute with memory. "both ways" takes positions and
-        rates of one message, "all" of two. The d of both counts the way up and the way down
-        together, however they share it, and late torque feedback varies up to its own e meanwhile;
-        alone, a channel has neither beside it.
+        rates of one message, "all" of two. The d of both counts the ways up and down together,
+        however they share it, and late torque feedback varies up to its own e meanwhile.
 
         Raises:
             SolverError: rounding leaves a norm open.
@@ -178,12 +177,8 @@ class FrozenLoop(DelayedLoop):
         return [(self.B, np.where(columns, self.C, 0.0)), (into, takes)]
 
     def _varying(self, parts: list[tuple[Array, Array]], *, late: bool) -> float:
-        """Jitter margin of the loop of which these parts, B and C, are late, each by itself.
-
-        Args:
-            parts: of what the command says and memory takes in.
-            late: whether torque feedback of the drives is late too.
-        """
+        """Jitter margin of the loop of which these parts, B and C, are late, each by itself; with
+        `late` the drives' torque feedback is, too."""
         parts = [(B, C) for B, C in parts if C.any()]
         if not parts:
             return np.inf
@@ -200,12 +195,11 @@ class FrozenLoop(DelayedLoop):
         channels = {f"{k}": range(*ends) for k, ends in enumerate(pairwise(edges))}
         return loop.jitter_margin(channels if len(parts) > 1 else None, alone=False).delay
 
-    def late_measurement(self, columns: BoolArray, *, weight: float = 1.0) -> "FrozenLoop":
+    def late_measurement(self, columns: BoolArray) -> "FrozenLoop":
         """Return the loop of which only some measured states are late, on their way up.
 
         Args:
             columns: (N,) which states; those of `memory` are the controller's own and never late.
-            weight: of what memory takes in against the command, in size; it moves no root.
         """
         plant = len(self.states) - self.memory
         takes = self.A_0[plant:].copy()
@@ -213,7 +207,7 @@ class FrozenLoop(DelayedLoop):
         C = self.C.copy()
         C[:, plant:] = 0.0
         size = float(np.linalg.norm(takes))
-        scale = weight * (float(np.linalg.norm(C)) or 1.0) / size if size else 1.0
+        scale = (float(np.linalg.norm(C)) or 1.0) / size if size else 1.0
         B = np.hstack([self.B, np.eye(len(self.states))[:, plant:] / scale])
         C = np.where(columns, np.vstack([C, scale * takes]), 0.0)
         A_0 = self.A_0 + self.B @ self.C - B @ C
