@@ -2,7 +2,7 @@
 
 Run `python second_verifier.py CERTIFICATE`. It shares no line with the first and imports nothing of
 sealag. A double is a rational number, and a symmetric matrix is positive definite if and only if
-its leading minors are positive (Sylvester), which Bareiss's elimination gives in whole numbers.
+the pivots of L D Lᵀ are positive, which whole numbers, rounded to the safe side, show.
 Each line of the output is a claim that holds, does not hold, or cannot be decided here. Status: 0
 no claim fails, 1 one fails, 2 the file is no certificate.
 
@@ -27,15 +27,17 @@ Matrix = list[list[Any]]
 Claim = tuple[str, bool | None, str]  # what; whether it holds, None if undecided; detail
 KEYS = """D_theta asymmetry assumptions bounds_s common_multiplier common_multiplier_delay_s
     conservatism contraction criterion critical delay_s equilibrium feedback first_crossing_s
-    gravity hashes instant_basis instant_margins_s instants joints left_open levels local_loop
-    local_margin_s max_delay_s max_delay_upper_s motor_inertia proofs published_max_delay_s reasons
-    rotor_inertia schema spring_damping spring_stiffness stable status stiffness_form task_inertia
-    time_s time_varying_delay_s time_varying_multiplier time_varying_windows torque_bandwidth
-    unstable_modes versions viscous_friction worst worst_motion"""
+    gravity hashes holds_for instant_basis instant_margins_s instants jitter_margin_s joints
+    left_open levels local_loop local_margin_s max_delay_s max_delay_upper_s motor_inertia proofs
+    published_max_delay_s reasons rotor_inertia schema spring_damping spring_stiffness stable
+    status stiffness_form task_inertia time_s time_varying_delay_s time_varying_multiplier
+    time_varying_windows torque_bandwidth unstable_modes versions viscous_friction worst
+    worst_motion"""
 LARGEST_FILE = 100_000_000  # bytes; ten times more would take 20 GB of memory
 MOST_VERTICES = 4096  # of all windows; each costs some 20 ms
 AGREE = Fraction(1, 10**9)  # relative difference of redundant numbers, which were rounded
 SYMMETRIC = Fraction(1, 10**7)  # asymmetry up to which a certified F counts as symmetric
+BITS = 720  # of positive: ten times fewer leave the jitter margin of stiff robots open
 DIGITS = 1000  # of the intervals in Routh's table; 400 still decide 56 states
 
 class WrongInputError(ValueError):
@@ -50,8 +52,8 @@ def read(path: str) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError) as error:
         raise WrongInputError(getattr(error, "strerror", None) or str(error)) from error
     odd = set(data if isinstance(data, dict) else {}) ^ set(KEYS.split())
-    if odd or data["schema"] != "sealag-certificate/5":
-        raise WrongInputError(f"it is not sealag-certificate/5, or has odd keys {sorted(odd)[:5]}")
+    if odd or data["schema"] != "sealag-certificate/6":
+        raise WrongInputError(f"it is not sealag-certificate/6, or has odd keys {sorted(odd)[:5]}")
     return data
 def _figure(text: str) -> int | float:
     if not math.isfinite(value := float(text)):
@@ -98,16 +100,25 @@ def whole(A: Matrix) -> list[list[int]]:
     factor = math.lcm(*(x.denominator for row in A for x in row))
     return [[int(x * factor) for x in row] for row in A]
 def positive(A: Matrix) -> bool:
-    """Whether the symmetric part of A is positive definite: all leading minors are positive."""
-    M, before = whole(combine(1, A, 1, turned(A))), 1
-    for k in range(len(M)):
-        pivot = M[k][k]
+    """Whether A + Aᵀ is positive definite, by more than 2⁻⁷⁰⁰ of its diagonal: pivots of L D Lᵀ.
+
+    Rows are scaled by powers of two, and numbers rounded down to multiples of 2⁻⁷²⁰. A symmetric
+    error of less than 1 an entry moves no eigenvalue by more than n, which is taken off each time.
+    """
+    M, n = combine(1, A, 1, turned(A)), len(A)
+    if any(M[k][k] <= 0 for k in range(n)):
+        return False
+    half = [(x.denominator.bit_length() - x.numerator.bit_length()) // 2
+            for x in (M[k][k] for k in range(n))]
+    N = [[math.floor(x * Fraction(2) ** (half[i] + half[j] + BITS)) for j, x in enumerate(row)]
+         for i, row in enumerate(M)]
+    while N:
+        for k in range(len(N)):
+            N[k][k] -= n
+        (pivot, *row), *rest = N
         if pivot <= 0:
             return False
-        for i in range(k + 1, len(M)):
-            left = M[i][k]
-            M[i] = [(pivot * x - left * y) // before for x, y in zip(M[i], M[k])]
-        before = pivot
+        N = [[x - left * y // pivot for x, y in zip(one, row)] for left, *one in rest]
     return True
 def proof_claims(c: dict[str, Any], p: dict[str, Any], D: list[Fraction]) -> Iterator[Claim]:
     """What an instant's numbers claim: F is the law's, and d is dissipative with W = d Q."""
@@ -244,33 +255,61 @@ def loop_claims(c: dict[str, Any]) -> Iterator[Claim]:
     V = matrix(V, s, len(V[0])) if V else [[] for _ in states]
     lost = max(square(times(A, V)) / max(square(A), 1) for A in (A_0, A_1))
     yield "nothing acts along the symmetries", lost <= AGREE**2, f"to {float(lost) ** 0.5:.0e}"
-    name = "unstable modes without delay"
+    A_e = [[Fraction(0)] * s for _ in states]
+    A_e = A_e if loop["A_e"] is None else matrix(loop["A_e"], s, s)
+    parts = _quotient([combine(1, combine(1, A_0, 1, A_1), 1, A_e), A_1, A_e], V, states)
+    name, A = "unstable modes without delay", parts[0]
     if loop["A_e"] is not None:
         yield name, None, "an embedded delay is left in the loop without d"
     else:
-        A = _quotient(combine(1, A_0, 1, A_1), A_1, V, states)
         found = unstable(polynomial(whole(A)))
         words = f"{found} roots right of the axis, {s - len(A)} by symmetry"
         yield name, True if found == modes else _near(A, modes), words
+    yield _jitter_claim(c, loop, parts)
     words = "it is a root of a transcendental function; the first verifier excludes shorter delays"
     yield "first crossing and local margin", None, words
-def _quotient(A: Matrix, A_1: Matrix, V: Matrix, states: list[str]) -> Matrix:
-    """A without symmetries v (A v = 0) and rates along them that last (A w = v, A_1 w = 0).
-
-    With x = v u + y, y_p = 0 at the largest entry p of v: y' = (A_i − v_i / v_p A_p) y.
+def _jitter_claim(c: dict[str, Any], loop: dict[str, Any], parts: list[Matrix]) -> Claim:
+    """xᵀPx decreases: X - [R A, R L]ᵀ b X b [R A, R L] - [P A, P L] - its transpose > 0, P > 0."""
+    name, claimed, proof = "jitter margin", time(c["jitter_margin_s"]), loop["jitter"]
+    if proof is None:
+        margin = time(c["instant_margins_s"][c["critical"]["instant"]])
+        none = claimed is None or claimed == margin == 0
+        free = claimed == margin == math.inf and not any(map(any, parts[1]))
+        return name, none or free, ""
+    d, k, S = number(proof["delay_s"]), len(parts[0]), number(loop["embedded_delay_s"])
+    rows = [[i for i, row in enumerate(A) if any(row)] for A in parts[1:]]
+    late = [i for at in rows for i in at]
+    K = [[*row, *(Fraction(i == j) for j in late)] for i, row in enumerate(parts[0])]
+    P, X = matrix(proof["P"], k, k), [matrix(proof[x], len(at), len(at)) for x, at in
+                                      zip(("X", "X_e"), rows)]
+    decrease = spread([[[Fraction(0)] * k for _ in range(k)], *X])
+    for A, at, multiplier, bound in zip(parts[1:], rows, X, (d, S)):
+        moved = times([A[i] for i in at], K)
+        loss = times(turned(moved), times(multiplier, moved)) if at else []
+        decrease = combine(1, decrease, -(bound**2), loss) if at else decrease
+    power = times(P, K) + [[Fraction(0)] * len(decrease) for _ in late]
+    even = all(turned(one) == one for one in (P, *X))
+    first = time(c["first_crossing_s"])
+    good = even and 0 < d == claimed and (first is None or d <= first)
+    decreases = good and positive(P) and positive(combine(1, decrease, -2, power))
+    return name, decreases, f"{float(d)} s, {k} states, {len(decrease) - k} late signals"
+def _quotient(parts: list[Matrix], V: Matrix, states: list[str]) -> list[Matrix]:
+    """A, A_1, A_e without symmetries v (A v = 0) and rates along them that last: A w = v, A_1 w =
+    A_e w = 0. With x = v u + y, y_p = 0 at the largest entry p of v: y' = (A_i - v_i / v_p A_p) y.
     """
     columns, place = turned(V), {name: k for k, name in enumerate(states)}
     for v in list(columns):
         rate = [v[place[x[5:]]] if x[:5] == "d/dt " else Fraction(0) for x in states]
-        kept = combine(1, times(A, turned([rate])), -1, turned([v])) + times(A_1, turned([rate]))
+        A, *late = (times(A, turned([rate])) for A in parts)
+        kept = sum(late, combine(1, A, -1, turned([v])))
         columns += [rate] if any(rate) and square(kept) <= AGREE**2 * square([v]) else []
     while columns:
         v, *columns = columns
         p = max(range(len(v)), key=lambda k: abs(v[k]))
         rest, ratio = [k for k in range(len(v)) if k != p], [x / v[p] for x in v]
-        A = [[A[i][k] - ratio[i] * A[p][k] for k in rest] for i in rest]
+        parts = [[[A[i][k] - ratio[i] * A[p][k] for k in rest] for i in rest] for A in parts]
         columns = [[w[i] - ratio[i] * w[p] for i in rest] for w in columns]
-    return A
+    return parts
 def _near(A: Matrix, modes: int) -> bool | None:
     """False unless roots so near the axis that rounding moves them over it make the difference."""
     size = max(abs(x) for row in A for x in row) * Fraction(1, 10**12)

@@ -144,7 +144,7 @@ def test_a_program_is_said_to_remember_and_to_bend(tmp_path, cli):
     project.write_text(f'{head}[controller]\nkind = "python"\nfile = "soft.py"\n\n{delays}')
     code, text, err = cli("margin", project)
     assert (code, err) == (0, "")
-    assert "one way varies, every delay below it" in text
+    assert "both ways vary, every delay below it" in text
     assert re.search(r"controller +7 states; nonlinear by 0\.\d+ of its answers", text)
 
 

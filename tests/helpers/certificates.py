@@ -53,13 +53,20 @@ def _made(name: str) -> dict[str, Any]:
         system = sealag.load(EXAMPLES / "anymal.toml")
         law = replace(system.law, signal=MotorAngles())
         return plain(sealag.certify(replace(system, law=law, contacts=())))
+    if name == "hume held":
+        return plain(sealag.certify(sealag.load(EXAMPLES / "hume_held.toml")))
+    if name == "late feedback":
+        system = sealag.load(EXAMPLES / "hume_held.toml")
+        late = replace(system, delays=replace(system.delays, delayed_torque_feedback=True))
+        return plain(sealag.certify(late))
     return plain(sealag.certify(sealag.load(EXAMPLES / "baxter.toml")))
 
 
 def made(name: str) -> dict[str, Any]:
     """A fresh copy: baxter (one instant), moving (half a step of Hume, with multipliers for all of
     it), crawl (two priority levels, published), one foot (Hume, free to turn about it), flying
-    (ANYmal without contacts, free to move anywhere)."""
+    (ANYmal without contacts, free to move anywhere), hume held (stable, in the air), late feedback
+    (the same, its torque feedback late by the embedded delay)."""
     return copy.deepcopy(_made(name))
 
 
@@ -76,7 +83,14 @@ def _moving() -> Any:
 
 def without_loop(data: dict[str, Any]) -> dict[str, Any]:
     """The same without any claim about the frozen loop, the margins or stability."""
-    nothing = ("local_loop", "local_margin_s", "first_crossing_s", "stable", "conservatism")
+    nothing = (
+        "local_loop",
+        "jitter_margin_s",
+        "local_margin_s",
+        "first_crossing_s",
+        "stable",
+        "conservatism",
+    )
     count = data["instants"]
     open_ = {"instant_margins_s": [None] * count, "instant_basis": ["open"] * count}
     less = {**data, **dict.fromkeys(nothing), **open_, "unstable_modes": 0}

@@ -193,6 +193,45 @@ FORGED = {
         "baxter",
         lambda d: d["local_loop"].update(frequency_rad_s=2.0 * d["local_loop"]["frequency_rad_s"]),
     ),
+    "a longer jitter margin": ("baxter", lambda d: _jitter(d, 1.00001)),
+    "jitter margin without multipliers": (
+        "baxter",
+        lambda d: d["local_loop"].update(jitter=None),
+    ),
+    "another jitter margin than proven": ("baxter", lambda d: d.update(jitter_margin_s=0.05)),
+    "jitter margin unbounded": (
+        "baxter",
+        lambda d: (d.update(jitter_margin_s="unbounded"), d["local_loop"].update(jitter=None)),
+    ),
+    "none where the loop is stable": (
+        "baxter",
+        lambda d: (d.update(jitter_margin_s=0.0), d["local_loop"].update(jitter=None)),
+    ),
+    "storage that is not positive": (
+        "baxter",
+        lambda d: _all(d["local_loop"]["jitter"], "P", lambda x: -x),
+    ),
+    "storage of another loop": (
+        "baxter",
+        lambda d: _all(d["local_loop"]["jitter"], "P", lambda x: 1.01 * x),
+    ),
+    "lighter X": (
+        "baxter",
+        lambda d: _all(d["local_loop"]["jitter"], "X", lambda x: 0.99 * x),
+    ),
+    "asymmetric X": (
+        "baxter",
+        lambda d: d["local_loop"]["jitter"]["X"][0].__setitem__(1, 0.0),
+    ),
+    "X of fewer signals": (
+        "baxter",
+        lambda d: d["local_loop"]["jitter"].update(X=[[1.0]]),
+    ),
+    "jitter margin of a robot": (
+        "baxter",
+        lambda d: d["holds_for"].update(jitter_margin_s="any robot"),
+    ),
+    "jitter margin of what is unstable": ("moving", lambda d: d.update(jitter_margin_s=0.01)),
     "multiplier of no bound": (
         "baxter",
         lambda d: d.update(common_multiplier=d["proofs"][0]["W"][0]),
@@ -206,6 +245,16 @@ FORGED = {
         ),
     ),
 }
+
+
+def _jitter(data, factor):
+    """State a longer jitter margin everywhere."""
+    data["jitter_margin_s"] *= factor
+    data["local_loop"]["jitter"]["delay_s"] = data["jitter_margin_s"]
+
+
+def _all(holder, key, change):
+    holder[key] = [[change(x) for x in row] for row in holder[key]]
 
 
 @pytest.mark.parametrize("name", FORGED)

@@ -103,12 +103,14 @@ def test_continuous_matrices_tick_as_their_exact_discretisation(tmp_path):
         np.testing.assert_allclose(out - step.offset, expected, atol=1e-9)
 
 
-def test_each_way_has_a_jitter_margin(tmp_path):
+def test_each_channel_has_a_jitter_margin_and_both_ways_together(tmp_path):
     loop = arm(tmp_path, FILTERED).frozen()
-    margin, ways = loop.margin().delay, loop.jitter_ways()
-    assert 0.7 * margin < ways["measurement"] <= margin
+    margin, ways = loop.margin().delay, loop.jitter_channels()
     assert 0.7 * margin < ways["command"] <= margin
-    late = loop.late_measurement(np.ones(len(loop.states), dtype=bool), weight=0.1)
+    for name, alone in loop.channels().items():
+        assert 0.3 * alone < ways[name] <= alone
+    assert 0.4 * margin < ways["all"] <= ways["both ways"] <= ways["command"] * (1.0 + 1e-6)
+    late = loop.late_measurement(np.ones(len(loop.states), dtype=bool))
     assert late.margin().delay == pytest.approx(margin, rel=1e-9)
 
 

@@ -228,6 +228,86 @@ class TestEmbedded:
         assert found.unstable_roots == 0
 
 
+class TestChannels:
+    """Signals with a delay of their own each, all varying at once."""
+
+    def loop(self, seed=0):
+        A_0, B, C, _ = plant(np.random.default_rng(seed), law="pd")
+        N = len(A_0)
+        rates = np.arange(N) >= N // 2
+        n = len(C)
+        parts = np.vstack([np.where(rates, 0.0, C), np.where(rates, C, 0.0)])
+        rows = {"positions": range(n), "rates": range(n, 2 * n)}
+        return A_0, np.hstack([B, B]), parts, rows
+
+    def test_two_late_integrators_add_up(self):
+        """ẋ = −a x(t − σ) − b x(t − τ): T has the norm a + b at ω → ∞ with the best weight."""
+        for a, b in ((1.0, 1.0), (1.0, 2.0), (0.01, 30.0)):
+            found = DelayedLoop([[0.0]], [[1.0, 1.0]], [[-a], [-b]]).jitter_margin(
+                {"a": [0], "b": [1]}
+            )
+            assert found.delay == pytest.approx(1.0 / (a + b), rel=1e-4)
+            assert found.delay <= 1.0 / (a + b) * (1.0 + 1e-9) <= found.upper * (1.0 + 1e-6)
+            assert found.channels["a"] == pytest.approx(1.0 / a, rel=1e-8)
+            assert found.channels["b"] == pytest.approx(1.0 / b, rel=1e-8)
+
+    def test_one_channel_is_the_jitter_margin(self):
+        A_0, B, C, _ = self.loop()
+        one = DelayedLoop(A_0, B, C)
+        found = one.jitter_margin({"all": range(len(C))})
+        assert found.delay == pytest.approx(one.jitter_margin().delay, rel=1e-8)
+        assert found.channels["all"] == found.delay
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_all_at_once_is_proven_by_the_weighed_norm(self, seed):
+        """The norm over a fine grid, no coarse weight better, and constant delays as a bound."""
+        A_0, B, C, rows = self.loop(seed)
+        loop = DelayedLoop(A_0, B, C)
+        found = loop.jitter_margin(rows)
+        if found.unstable_roots:
+            pytest.skip("unstable without delay")
+        assert found.delay <= min(found.channels.values()) * (1.0 + 1e-9)
+        assert found.delay <= min(found.upper, loop.margin().delay)
+        A, n = A_0 + B @ C, len(C) // 2
+        sides = []
+        for at in (slice(0, n), slice(n, 2 * n)):
+            U, values, V = np.linalg.svd(C[at], full_matrices=False)
+            sides.append((B[:, at] @ U * np.sqrt(values), np.sqrt(values)[:, None] * V))
+        L, R = np.hstack([a for a, _ in sides]), np.vstack([b for _, b in sides])
+        grid = np.concatenate([np.geomspace(1e-2, 1e5, 600), np.abs(np.linalg.eigvals(A))])
+        T = [1j * w * R @ np.linalg.solve(1j * w * np.eye(len(A)) - A, L) for w in grid]
+        best = 0.0
+        for power in np.linspace(-6, 6, 61):
+            pull = np.repeat([1.0, 10.0 ** (power / 2.0)], n)
+            sizes = [np.linalg.norm(pull[:, None] * one / pull, 2) for one in T]
+            best = max(best, 1.0 / max(sizes))
+        assert found.delay >= best * (1.0 - 1e-3)
+        assert found.delay <= best * 1.1
+
+    @pytest.mark.parametrize("periods", [(3, 7), (20, 13), (1, 53)])
+    def test_no_two_delays_below_it_make_the_loop_grow(self, periods):
+        A_0, B, C, rows = self.loop()
+        found, N, m = DelayedLoop(A_0, B, C).jitter_margin(rows), len(A_0), len(C)
+        step = found.delay / 40.0
+        most = int(0.99 * found.delay / step)
+        x, past = np.ones(N), [np.ones(N)] * 200
+        block = np.zeros((N + m, N + m))
+        block[:N, :N], block[:N, N:] = A_0, B
+        phi, sizes = expm(block * step)[:N], []
+        for k in range(4000):
+            late = np.repeat([most * (k // period % 2) for period in periods], m // 2)
+            u = np.array([C[i] @ past[-1 - steps] for i, steps in enumerate(late)])
+            x = phi @ np.concatenate([x, u])
+            past.append(x)
+            sizes.append(float(np.linalg.norm(x)))
+        assert max(sizes[-200:]) < 0.5 * max(sizes[:400])
+
+    @pytest.mark.parametrize("rows", [{"a": [0]}, {"a": [0, 1], "b": [1]}, {"a": [0, 5]}])
+    def test_each_row_is_in_one_channel(self, rows):
+        with pytest.raises(InputError, match="each of the 2 rows"):
+            DelayedLoop([[0.0]], [[1.0, 1.0]], [[-1.0], [-1.0]]).jitter_margin(rows)
+
+
 def test_symmetries_are_left_out():
     A_0, B, C, _ = plant(np.random.default_rng(5), law="stiffness")
     N = len(A_0)

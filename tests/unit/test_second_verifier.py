@@ -13,6 +13,7 @@ from helpers.certificates import made, resealed
 from sealag.cli import main
 from sealag.second_verifier import claims
 
+PROVEN = {"baxter", "crawl", "hume held", "late feedback"}
 FILE = Path(sealag.second_verifier.__file__)
 
 
@@ -22,20 +23,25 @@ def verdicts(data):
 
 def test_it_is_short_and_stands_alone():
     text = FILE.read_text()
-    assert len(text.splitlines()) <= 400
+    assert len(text.splitlines()) <= 450
     for node in ast.walk(ast.parse(text)):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
         assert all(name.split(".")[0] in sys.stdlib_module_names for name in names)
 
 
-@pytest.mark.parametrize("design", ["baxter", "moving", "crawl", "one foot", "flying"])
+@pytest.mark.parametrize(
+    "design", ["baxter", "moving", "crawl", "one foot", "flying", "hume held", "late feedback"]
+)
 def test_it_agrees_with_the_first(design):
-    found = verdicts(made(design))
+    data = made(design)
+    found = verdicts(data)
+    assert found["jitter margin"] is True
+    assert (data["local_loop"]["jitter"] is not None) is (design in PROVEN)
     assert False not in found.values(), [name for name, holds in found.items() if holds is False]
     undecided = {name for name, holds in found.items() if holds is None}
     assert "first crossing and local margin" in undecided
-    assert found["unstable modes without delay"] is True
+    assert found["unstable modes without delay"] is (None if design == "late feedback" else True)
 
 
 def _scaled(*path, factor):
@@ -45,6 +51,11 @@ def _scaled(*path, factor):
         data[path[-1]] *= factor
 
     return change
+
+
+def _longer(data):
+    data["jitter_margin_s"] *= 1.0001
+    data["local_loop"]["jitter"]["delay_s"] = data["jitter_margin_s"]
 
 
 def _shift(d):
@@ -85,6 +96,18 @@ FORGED = {
         "positions change",
         lambda d: d["local_loop"]["A_0"][0].__setitem__(0, 1.0),
     ),
+    "jitter": ("hume held", "jitter margin", _longer),
+    "storage": (
+        "hume held",
+        "jitter margin",
+        lambda d: d["local_loop"]["jitter"]["P"][0].__setitem__(0, 1e-9),
+    ),
+    "multiplier of late signals": (
+        "hume held",
+        "jitter margin",
+        _scaled("local_loop", "jitter", "X", 0, 0, factor=0.9),
+    ),
+    "no proof": ("hume held", "jitter margin", lambda d: d["local_loop"].update(jitter=None)),
     "status": ("moving", "status follows", lambda d: d.update(status="not_certified")),
     "asymmetry": (
         "moving",
@@ -142,7 +165,7 @@ def test_it_runs_as_a_file_and_by_the_command(tmp_path, capsys):
     whole = json.dumps(data)
     for text, words in (
         ("{", "Expecting property name"),
-        ("[]", "it is not sealag-certificate/5"),
+        ("[]", "it is not sealag-certificate/6"),
         ('{"schema": 1, "schema": 2}', "a key stands twice"),
         (json.dumps({**data, "joints": 3}), "an entry is of another type or size"),
         (json.dumps({**data, "delay_s": None}), "'None' is no finite number"),

@@ -131,6 +131,7 @@ def _show_certificate(certificate: Certificate, path: Path, warnings: Sequence[s
             f"{worst.instant} of {question.instants}, at {worst.time_s:.3f} s",
         ),
         ("limiting joints", limiting),
+        ("jitter margin", time_text(answer.jitter_margin_s)),
         ("exact local margin", time_text(answer.local_margin_s)),
         ("first crossing", time_text(answer.first_crossing_s)),
         ("published criterion says", _published(answer)),

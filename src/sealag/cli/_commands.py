@@ -33,6 +33,14 @@ _STATED = {
     Status.NOT_CERTIFIED: ": as it states, the design is not certified",
 }
 
+_JITTERS = {
+    "positions": "only positions vary",
+    "rates": "only rates vary",
+    "command": "only the command varies",
+    "all": "each varies by itself",
+}
+"""Channels of a jitter margin; both ways at once are the margin itself."""
+
 _BASES = {"auto": None, "floating": True, "fixed": False}
 
 
@@ -145,8 +153,11 @@ def margin_project(
     if found.not_passive:
         passive = f"none: {found.not_passive}"
     show(f"{'passive bound':26} {passive}")
-    varies = "one way varies, every delay below it" if found.memory else "every delay below it"
+    varies = "both ways vary, every delay below it" if found.memory else "every delay below it"
     show(f"{'jitter margin':26} {time_text(found.jitter_s):12} this robot, {varies}")
+    for name, value in found.jitter_channels_s.items():
+        if name in _JITTERS:
+            show(f"{f'  {_JITTERS[name]}':26} {time_text(value)}")
     show(f"{'local margin':26} {time_text(found.delay_s):12} this robot, a constant delay: exact")
     for name, value in found.channels_s.items():
         show(f"{f'  only {name} late':26} {time_text(value)}")

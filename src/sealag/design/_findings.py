@@ -32,6 +32,7 @@ from sealag.passivity import (
     Critical,
     Evidence,
     InstantProof,
+    LocalLoop,
     Question,
     Rest,
     Solver,
@@ -64,6 +65,7 @@ class Findings:
         time_varying: inside polytopes; None if it was not asked for.
         proofs: of instants.
         local: stability and local margin.
+        loop: the frozen loop of the critical instant, with the proof of its jitter margin.
         rest: where the loop rests; None for a motion.
     """
 
@@ -79,6 +81,7 @@ class Findings:
     time_varying: Bound | None
     proofs: tuple[InstantProof, ...]
     local: Local
+    loop: LocalLoop | None
     rest: Equilibrium | None
 
     @classmethod
@@ -139,6 +142,7 @@ class Findings:
             time_varying=None if withdrawn else moving,
             proofs=held,
             local=local,
+            loop=local.stated_loop(),
             rest=rest,
         )
 
@@ -271,11 +275,13 @@ def _answer(case: Findings) -> Answer:
         left_open=_left_open(case),
         stable=local.stable,
         unstable_modes=local.unstable_modes,
+        jitter_margin_s=_jitter_margin(case),
         local_margin_s=local.margin_s,
         critical=Critical(instant=local.critical, time_s=float(case.motion.time[local.critical])),
         first_crossing_s=local.first_crossing_s,
         equilibrium=None if rest is None else Rest(found=rest.found, moved_rad=rest.moved),
         conservatism=_conservatism(local.margin_s, case.max_delay),
+        holds_for=case.kind.holds_for(),
         assumptions=assumptions_of(system, case.motion, case.kind, local),
         versions={
             "sealag": __version__,
@@ -330,7 +336,7 @@ def _evidence(case: Findings) -> Evidence:
         common_multiplier=_stated_multiplier(case.common),
         time_varying_multiplier=W_moving,
         time_varying_windows=windows,
-        local_loop=case.local.stated_loop(),
+        local_loop=case.loop,
     )
 
 
@@ -348,6 +354,18 @@ def _finite(value: float) -> float | None:
 def _conservatism(margin: float | None, bound: float) -> float | None:
     known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
     return margin / bound if margin is not None and known else None
+
+
+def _jitter_margin(case: Findings) -> float | None:
+    """Of the critical instant's loop: what is proven, 0 where it is unstable without delay."""
+    local, loop = case.local, case.loop
+    here = local.delay[local.critical]
+    if here == 0.0:
+        return 0.0
+    if loop is not None and loop.jitter is not None:
+        return loop.jitter.delay_s
+    free = loop is not None and not loop.A_1.any()
+    return np.inf if free and np.isinf(here) else None
 
 
 def _left_open(case: Findings) -> dict[str, str]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from sealag.design._along import Along
 from sealag.design._criteria import ASYMMETRY_TOLERANCE
+from sealag.design._proven import proven_jitter
 from sealag.errors import ContractionError, SolverError
 from sealag.margin import DelayMargin
 from sealag.passivity import Basis, LocalLoop, Place
@@ -93,13 +94,14 @@ class Local:
         return None if np.isinf(first) and not self.margin.guaranteed else first
 
     def stated_loop(self) -> LocalLoop | None:
-        """Return the frozen loop of the critical instant as a certificate states it."""
+        """Return the frozen loop of the critical instant as a certificate states it, with a proof
+        of its jitter margin where there is one."""
         loop, margin = self.loop, self.margin
         if loop is None:
             return None
         crosses = margin is not None and np.isfinite(margin.frequency)
         late = bool(loop.A_e.any()) and loop.embedded_delay > 0.0
-        return LocalLoop(
+        stated = LocalLoop(
             states=tuple(loop.states),
             A_0=loop.A_0 if late else loop.A_0 + loop.A_e,
             A_1=loop.A_1,
@@ -109,6 +111,8 @@ class Local:
             at=self.at,
             frequency_rad_s=float(margin.frequency) if margin is not None and crosses else None,
         )
+        unstable = margin is None or margin.unstable_roots > 0
+        return stated if unstable else proven_jitter(stated, loop)
 
     def undercut(self, bounds: Array) -> list[int]:
         """Return the instants whose exact margin lies below their bound.

@@ -32,7 +32,10 @@ class LocalMargins:
         not_passive: why none does, in words; empty if one does.
         jitter_s: smallest jitter margin over the instants, s: stable for every delay that varies as
             it likes below it; 0 where the loop is unstable without delay, None if not known. Of a
-            controller with memory while one of both ways varies and the other is constant.
+            controller with memory the ways up and down both vary.
+        jitter_channels_s: jitter margins at the critical instant, s, of "positions", "rates" and
+            "command" alone, and of "all" at once, each with a delay of its own; empty if the loop
+            is unstable without delay, or has one channel only.
         channels_s: exact margin at the critical instant if only the position signals, or only the
             rates, of the command are late, s; empty if it feeds back no rates.
         memory: states of the controller in the loop, that it moves at its ticks; 0 for a law.
@@ -59,6 +62,7 @@ class LocalMargins:
     passive_s: float
     not_passive: str
     jitter_s: float | None
+    jitter_channels_s: Mapping[str, float]
     channels_s: Mapping[str, float]
     memory: int
     bend: float
@@ -79,7 +83,8 @@ class LocalMargins:
         """Return everything as JSON says it: "unbounded" for a time that no delay reaches, None for
         what is not known."""
         plain = {key: stated(value) for key, value in asdict(self).items()}
-        plain["channels_s"] = {name: stated(value) for name, value in self.channels_s.items()}
+        for key in ("channels_s", "jitter_channels_s"):
+            plain[key] = {name: stated(value) for name, value in plain[key].items()}
         plain["intervals"] = [
             {"from_s": shortest, "to_s": stated(longest), "unstable_roots": count}
             for shortest, longest, count in self.intervals
@@ -124,6 +129,7 @@ def local_margins(along: Along, horizon: float | None) -> LocalMargins:
         passive_s=float(bounds.min()),
         not_passive="; ".join(bound.refusals),
         jitter_s=jitter_along(along, bounds, local),
+        jitter_channels_s=_jitter_channels(loop, margin) if system.law.damped else {},
         channels_s=loop.channels() if system.law.damped else {},
         memory=loop.memory,
         bend=0.0 if system.program is None else loop.bend,
@@ -152,13 +158,15 @@ def _of_program(along: Along, horizon: float | None) -> LocalMargins:
         )
     loop = system.frozen()
     margin = loop.margin(horizon=horizon)
+    jitter = _jitter_channels(loop, margin)
     first = None if math.isnan(margin.first_crossing) else float(margin.first_crossing)
     return LocalMargins(
         delay_s=float(margin.delay),
         first_crossing_s=first,
         passive_s=0.0,
         not_passive=f"the controller is {system.no_law}",
-        jitter_s=0.0 if margin.unstable_roots else min(loop.jitter_ways().values()),
+        jitter_s=jitter["both ways"] if jitter else 0.0,
+        jitter_channels_s=jitter,
         channels_s=loop.channels(),
         memory=loop.memory,
         bend=0.0 if system.program is None else loop.bend,
@@ -175,6 +183,10 @@ def _of_program(along: Along, horizon: float | None) -> LocalMargins:
         bounded=0,
         intervals=margin.intervals,
     )
+
+
+def _jitter_channels(loop: FrozenLoop, margin: DelayMargin) -> dict[str, float]:
+    return {} if margin.unstable_roots else loop.jitter_channels()
 
 
 def _shares(loop: FrozenLoop, margin: DelayMargin, joints: tuple[str, ...]) -> dict[str, float]:

@@ -33,7 +33,8 @@ _PROBES = np.array([0.3 + 1.0j, 1.0 + 1.0j, 3.0 + 10.0j])
 _NOT_UNIQUE = frozenset(
     {"local_loop", "common_multiplier", "time_varying_multiplier", "time_varying_windows",
      "proofs", "worst_motion", "versions", "hashes", "common_multiplier_delay_s",
-     "time_varying_delay_s", "conservatism"}
+     "time_varying_delay_s", "jitter_margin_s",
+     "conservatism"}
 )  # fmt: skip
 """Fields with more than one right value: coordinates and multipliers are a choice, and solvers stop
 at different points. `verify` checks them from the file; the checks below compare the rest."""

@@ -1,7 +1,8 @@
 """Jitter margin: how much delay that varies as it likes a frozen loop tolerates."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -38,6 +39,7 @@ class JitterMargin:
         frequency: at which the bound is reached, rad/s; inf above all roots, NaN without a bound.
         unstable_roots: roots not in the open left half-plane without delay, symmetries left out.
         neutral: structural zero roots taken out.
+        channels: s; the same of each channel that was named, if only that is late.
     """
 
     delay: float
@@ -45,19 +47,18 @@ class JitterMargin:
     frequency: float
     unstable_roots: int
     neutral: int
+    channels: Mapping[str, float] = field(default_factory=dict)
 
 
 def jitter_margin(loop: Loop, broken: "Broken") -> JitterMargin:
-    """Bound `DelayedLoop.jitter_margin`.
+    """Bound `DelayedLoop.jitter_margin` of a loop whose one delay is that of its command.
 
     Args:
         loop: the prepared loop.
         broken: it, broken where it is late.
     """
-    unstable = roots_at_once(loop.A_0 + loop.A_1 + loop.A_e)[0] if len(loop.A_0) else 0
-    found = _Bound(0.0, 0.0, math.nan)
-    if not unstable:
-        found = _bound(broken, loop.embedded_delay)
+    unstable = roots_at_once(loop.A_0 + loop.A_1)[0] if len(loop.A_0) else 0
+    found = _Bound(0.0, 0.0, math.nan) if unstable else _bound(broken)
     return JitterMargin(
         delay=found.delay, upper=found.upper, frequency=found.frequency, unstable_roots=unstable,
         neutral=loop.neutral,
@@ -78,7 +79,7 @@ class _Peak(NamedTuple):
     frequency: float
 
 
-class _System(NamedTuple):
+class System(NamedTuple):
     """D + C (s − A)⁻¹ B."""
 
     A: Array
@@ -122,8 +123,8 @@ class Broken:
     def of(cls, loop: Loop, B: Array, C: Array) -> Self:
         """Break a loop at the singular values of C (m, n), and at those of its embedded part."""
         back = np.linalg.pinv(loop.lift)
-        L, R = _halves(C)
-        L_e, R_e = _halves(loop.A_e)
+        L, R = halves(C)
+        L_e, R_e = halves(loop.A_e)
         return cls(
             A=loop.A_0 + loop.A_1 + loop.A_e,
             left=np.hstack([back @ B @ L, L_e]),
@@ -131,13 +132,13 @@ class Broken:
             late=L.shape[1],
         )
 
-    def scaled(self, rows: Array, columns: Array) -> _System:
+    def scaled(self, rows: Array, columns: Array) -> System:
         """From w to the signals' rates, s R (s − A)⁻¹ L, with scaled rows and columns."""
         left, right = self.left * columns, rows[:, None] * self.right
-        return _System(self.A, left, right @ self.A, right @ left)
+        return System(self.A, left, right @ self.A, right @ left)
 
 
-def _halves(matrix: Array) -> tuple[Array, Array]:
+def halves(matrix: Array) -> tuple[Array, Array]:
     """L (m, r) and R (r, n) with L R the matrix, of one scale."""
     U, values, V = np.linalg.svd(matrix, full_matrices=False)
     rank = int((values > _RANK * values[0]).sum()) if values.size and values[0] > 0.0 else 0
@@ -145,88 +146,33 @@ def _halves(matrix: Array) -> tuple[Array, Array]:
     return U[:, :rank] * root, root[:, None] * V[:rank]
 
 
-def _bound(broken: Broken, embedded_delay: float) -> _Bound:
-    """The largest d that is proven."""
-    r, late = len(broken.right), broken.late
-    if not late:
+def _bound(broken: Broken) -> _Bound:
+    """The largest d that is proven, where nothing is late but the command."""
+    if not broken.late:
         return _Bound(math.inf, math.inf, math.nan)
-    one = np.ones(r)
+    one = np.ones(broken.late)
     plain = broken.scaled(one, one)
-    if late == r:
-        peak = _peak(plain)
-        delay, frequency = 1.0 / peak.high if peak.high else math.inf, peak.frequency
-    else:
-        delay, frequency = _with_drives(broken, embedded_delay)
-    if not math.isfinite(frequency):  # of no peak, or of one above all roots
-        own = plain.D[:late, :late]
-    else:
-        own = plain.at(np.array([frequency]))[0, :late, :late]
-    radius = float(np.abs(np.linalg.eigvals(own)).max())
+    peak = peak_of(plain)
+    delay, frequency = 1.0 / peak.high if peak.high else math.inf, peak.frequency
+    at = plain.D if not math.isfinite(frequency) else plain.at(np.array([frequency]))[0]
+    radius = float(np.abs(np.linalg.eigvals(at)).max())
     return _Bound(delay, max(1.0 / radius if radius else math.inf, delay), frequency)
 
 
-def _with_drives(broken: Broken, e: float) -> tuple[float, float]:
-    """The largest d beside late torque feedback, over the weight x of its multiplier x I, and the
-    frequency that sets it.
-
-    d ‖…‖ < 1 at a frequency is d² T_1ᴴ T_1 ≺ diag(I, x I) − x e² T_2ᴴ T_2, rows 1 of the command
-    and 2 of the drives.
-    """
-    from scipy.optimize import minimize_scalar
-
-    r, late = len(broken.right), broken.late
-    one, own = np.ones(r), np.arange(r) < late
-    plain = broken.scaled(one, one)
-    grid = _frequencies(broken.A)
-    grid = np.concatenate([grid, np.geomspace(grid[1:].min() / 10.0, 10.0 * grid.max(), 400)])
-    T = plain.at(grid)
-
-    def largest(x: float) -> Array:
-        """d at each frequency of the grid, s; 0 where late torque feedback alone is too much."""
-        weight = np.where(own, 1.0, x)
-        rest = np.diag(weight) - x * e**2 * _adjoint(T[:, late:]) @ T[:, late:]
-        good = np.linalg.eigvalsh(rest)[:, 0] > 0.0
-        found = np.zeros(len(T))
-        inner = T[good, :late] @ np.linalg.solve(rest[good], _adjoint(T[good, :late]))
-        found[good] = 1.0 / np.sqrt(np.maximum(np.linalg.eigvalsh(inner)[:, -1], 1e-300))
-        return found
-
-    best = minimize_scalar(
-        lambda power: -float(largest(10.0**power).min()), bounds=(-12.0, 12.0), method="bounded"
-    )
-    x = 10.0 ** float(best.x)
-    found = largest(x)
-    delay, frequency = float(found.min()), float(grid[found.argmin()])
-    for _ in range(_ROUNDS):
-        if delay <= 0.0:
-            break
-        root = math.sqrt(x)
-        peak = _peak(broken.scaled(np.where(own, delay, root * e), np.where(own, 1.0, 1.0 / root)))
-        if peak.high < 1.0:
-            return delay, frequency
-        frequency = peak.frequency
-        delay *= 1.0 - min(2.0 * (peak.high - 1.0) + _BRACKET, 0.5)
-    return 0.0, math.nan
-
-
-def _adjoint(stack: Array) -> Array:
-    return np.conj(np.swapaxes(stack, -1, -2))
-
-
-def _frequencies(A: Array) -> Array:
+def frequencies_of(A: Array) -> Array:
     """Where a response may have its peaks: 0, and the roots' imaginary parts and sizes, rad/s."""
     roots = np.linalg.eigvals(A)
     return np.unique(np.concatenate([[0.0], np.abs(roots.imag), np.abs(roots)]))
 
 
-def _peak(system: _System) -> _Peak:
+def peak_of(system: System) -> _Peak:
     """Bracket the largest singular value over all frequencies.
 
     Raises:
         SolverError: rounding leaves it open.
     """
     low = high = float(np.linalg.norm(system.D, 2))
-    frequency, width, tried = math.inf, _BRACKET, _frequencies(system.A)
+    frequency, width, tried = math.inf, _BRACKET, frequencies_of(system.A)
     for turn in range(_ROUNDS):
         sizes = np.linalg.norm(system.at(tried), 2, axis=(1, 2))
         best = int(sizes.argmax())

@@ -88,6 +88,8 @@ class Certificate(Stated):
           criterion `certified`), and the matrix inequality of `InstantProof` holds at its delay,
           (29) or (31);
         - no delay above `max_delay_upper_s` satisfies the criterion at the worst instant;
+        - the jitter margin, from P and X of the frozen loop at the critical instant; instead of
+          floating point in ball arithmetic;
         - the common multiplier at the instants in `proofs`, among them those that bind it;
         - the time-varying multiplier in every window, at all vertices with the ball around them.
 
@@ -149,12 +151,12 @@ class Certificate(Stated):
                     yield from proof.checks(self.question, number, bound_s=bound)
                 yield from common_checks(self, number)
                 yield from window_checks(self, number)
-                yield from self._local_checks()
+                yield from self._local_checks(exact=number is rationals)
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
             words = f"too large or too small to compute with: {error}"
             yield Check(name="numbers", ok=False, detail=words)
 
-    def _local_checks(self) -> Iterator[Check]:
+    def _local_checks(self, *, exact: bool) -> Iterator[Check]:
         loop, critical = self.evidence.local_loop, self.answer.critical.instant
         if loop is None:
             return
@@ -163,6 +165,7 @@ class Certificate(Stated):
             self.answer,
             margin_s=self.evidence.instant_margins_s[critical],
             proof=self.evidence.proof_of(critical),
+            exact=exact,
         )
 
     def confirmed(self, *, proven: bool = False) -> Self:
@@ -223,6 +226,7 @@ class Certificate(Stated):
                 reasons=(*answer.reasons, reason),
                 stable=None,
                 unstable_modes=0,
+                jitter_margin_s=None,
                 local_margin_s=None,
                 first_crossing_s=None,
                 conservatism=None,

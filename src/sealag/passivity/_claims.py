@@ -67,6 +67,9 @@ def _label_checks(c: Stated) -> Iterator[Check]:
         _KEY.fullmatch(key) and _VERSION.fullmatch(value) for key, value in answer.versions.items()
     )
     yield Check(name="versions", ok=good, detail=f"of {', '.join(answer.versions)}")
+    told = dict(answer.holds_for) == question.criterion.holds_for()
+    words = "words of the three numbers" if told else "other words than those of the criterion"
+    yield Check(name="what each number holds for", ok=told, detail=words)
     keys = [one.key for one in answer.assumptions]
     named = len(set(keys)) == len(keys) > 0 and all(_KEY.fullmatch(key) for key in keys)
     said = all(
@@ -209,6 +212,7 @@ def _no_loop(c: Stated) -> Check:
     none = c.evidence.instant_margins_s[at] == 0.0 and not rests
     known = c.evidence.instant_basis[at] is not Basis.OPEN and not none
     ok = not known and answer.unstable_modes == 0 and answer.first_crossing_s is None
+    ok &= answer.jitter_margin_s is None or (none and answer.jitter_margin_s == 0.0)
     words = "no frozen loop is in the file, and nothing is claimed of it"
     return Check(name="frozen loop", ok=ok, detail=words)
 

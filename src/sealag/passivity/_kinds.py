@@ -2,6 +2,9 @@
 
 from enum import StrEnum
 
+_THIS_ROBOT = "this robot, linearised, every delay that varies as it likes below it"
+_ANY_ROBOT = "any passive robot and environment, every delay that varies as it likes below it"
+
 
 class Status(StrEnum):
     """What may be done with the design at its own delay.
@@ -25,6 +28,15 @@ class Criterion(StrEnum):
 
     PUBLISHED = "published"
     CERTIFIED = "certified"
+
+    def holds_for(self) -> dict[str, str]:
+        """Return against what each of a certificate's three numbers is robust, by their keys."""
+        certified = self is Criterion.CERTIFIED
+        return {
+            "max_delay_s": _ANY_ROBOT if certified else "what (29) or (31) say as printed",
+            "jitter_margin_s": _THIS_ROBOT,
+            "local_margin_s": "this robot, linearised, a constant delay",
+        }
 
 
 class Basis(StrEnum):

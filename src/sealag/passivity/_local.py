@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
 from sealag.passivity._axis import DelayedLoop, roots_with_error, unstable_roots
 from sealag.passivity._checks import Check
+from sealag.passivity._jitter_proof import JitterProof, Quotient, quotient
 from sealag.passivity._kinds import Criterion, Place
 from sealag.passivity._proofs import AGREEMENT, InstantProof
 from sealag.passivity._statement import Answer, Question
@@ -67,6 +68,8 @@ class LocalLoop:
             those of the configuration there.
         frequency_rad_s: of the roots that cross at `first_crossing_s`; None where none does, or
             none is known.
+        jitter: multipliers that prove `jitter_margin_s`; None where it is 0, unbounded or not
+            known.
     """
 
     states: Annotated[tuple[str, ...], "s"]
@@ -77,6 +80,25 @@ class LocalLoop:
     symmetries: Annotated[Array, "s", ""]
     at: Place
     frequency_rad_s: float | None
+    jitter: JitterProof | None = None
+
+    def without_symmetries(self) -> Quotient:
+        """Divide out the symmetries, in rationals."""
+        A_e = np.zeros_like(self.A_0) if self.A_e is None else self.A_e
+        return quotient((self.A_0, self.A_1, A_e), self.symmetries, self.states)
+
+    def proven(self, delay_s: float, *, P: Array, X: Array, X_e: Array) -> "LocalLoop | None":
+        """Return the loop with a proof of its jitter margin; None if that proves nothing.
+
+        Args:
+            delay_s: the jitter margin, s.
+            P: as in `JitterProof`, of the loop `without_symmetries`.
+            X: as there.
+            X_e: as there.
+        """
+        proof = JitterProof(delay_s=delay_s, P=P, X=X, X_e=X_e)
+        found = proof.check(self.without_symmetries(), self.embedded_delay_s, exact=False)
+        return replace(self, jitter=proof) if found.ok else None
 
     @property
     def parts(self) -> list[Array]:
@@ -106,20 +128,26 @@ class LocalLoop:
         *,
         margin_s: float | None,
         proof: InstantProof | None,
+        exact: bool,
     ) -> Iterator[Check]:
-        """Check the loop's structure, its margin, first crossing and unstable modes.
+        """Check the loop's structure, its margins, first crossing and unstable modes.
 
         Args:
             question: of the certificate that this loop is part of.
             answer: of the same.
             margin_s: the margin that is claimed for the loop's instant, s.
             proof: of the loop's instant, if there is one.
+            exact: decide the jitter margin in rational arithmetic instead of balls.
         """
         yield from self._structure_checks(question, proof)
         yield self._symmetry_check()
         reduced = self._reduced()
         yield _unstable(answer.unstable_modes, reduced)
         yield self._margin_check(margin_s, answer.first_crossing_s)
+        yield self._jitter_check(answer, margin_s)
+        if self.jitter is not None:
+            loop = self.without_symmetries()
+            yield self.jitter.check(loop, self.embedded_delay_s, exact=exact)
         crossing = answer.first_crossing_s
         if crossing is None:
             return
@@ -276,6 +304,18 @@ class LocalLoop:
         ok &= late == 0.0 if self.A_e is None else late > 0.0
         words = f"{time_text(here)} with a first crossing at {time_text(crossing)}"
         return Check(name="local margin", ok=ok, detail=words)
+
+    def _jitter_check(self, answer: Answer, here: float | None) -> Check:
+        """The jitter margin is what is proven, and no longer than the first crossing."""
+        claimed, crossing = answer.jitter_margin_s, answer.first_crossing_s
+        if self.jitter is not None:
+            ok = claimed == self.jitter.delay_s and answer.unstable_modes == 0
+            ok &= crossing is None or self.jitter.delay_s <= crossing
+        else:
+            free = here == math.inf and not self.A_1.any()
+            ok = claimed is None or (claimed == 0.0 == here) or (claimed == math.inf and free)
+        words = f"{time_text(claimed)}, {'with' if self.jitter else 'without'} multipliers"
+        return Check(name="jitter margin", ok=ok, detail=words)
 
 
 def _size(A: Array) -> float:

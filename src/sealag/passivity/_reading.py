@@ -17,8 +17,8 @@ from sealag.passivity._stated import Stated
 
 T = TypeVar("T", bound=Stated)
 
-SCHEMA = "sealag-certificate/5"
-_OLD = re.compile(r"sealag-certificate/[0-4]")
+SCHEMA = "sealag-certificate/6"
+_OLD = re.compile(r"sealag-certificate/[0-5]")
 
 MOST_AXES = 8
 """Of a window; each doubles the vertices to check."""
@@ -83,9 +83,9 @@ def typed(data: dict[str, Any], source: Any, kind: type[T]) -> T:
     if schema != SCHEMA:
         if isinstance(schema, str) and _OLD.fullmatch(schema):
             raise CertificateError(
-                f"{name} has the layout {schema}, whose `certified` did not say that the design is "
-                "stable; certify the project again with this sealag, or verify the file with the "
-                "version that it names in `versions`."
+                f"{name} has the layout {schema}, which states no jitter margin; certify the "
+                "project again with this sealag, or verify the file with the version that it names "
+                "in `versions`."
             )
         raise CertificateError(f"{name} is not a certificate of the layout {SCHEMA}.")
     try:

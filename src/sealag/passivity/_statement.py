@@ -133,6 +133,8 @@ class Answer:
         stable: whether the loop is stable without delay at all instants; None where that is not
             decided at one of them, and unstable at none.
         unstable_modes: roots with positive real part without delay, the most over all instants.
+        jitter_margin_s: of the frozen loop at the critical instant, s: it is stable for every delay
+            that varies as it likes below this one; 0 where its margin is 0.
         local_margin_s: smallest exact local delay margin over all instants, s; 0 where a mode is
             unstable without delay.
         critical: the instant that sets the local margin.
@@ -140,6 +142,7 @@ class Answer:
             the local margin where no root is unstable without delay.
         equilibrium: where the loop rests; None for a motion.
         conservatism: local margin over max_delay_s; None where either is 0 or unbounded too.
+        holds_for: against what max_delay_s, jitter_margin_s and local_margin_s are robust.
         assumptions: what is assumed and not checked.
         versions: of sealag and the libraries that computed it; the kernels of `blas` decide the
             last bits of its numbers.
@@ -158,10 +161,12 @@ class Answer:
     left_open: Mapping[str, str]
     stable: bool | None
     unstable_modes: int
+    jitter_margin_s: Time | None
     local_margin_s: Time | None
     critical: Critical
     first_crossing_s: Time | None
     equilibrium: Rest | None
     conservatism: float | None
+    holds_for: Mapping[str, str]
     assumptions: tuple[Assumption, ...]
     versions: Mapping[str, str]

@@ -1,6 +1,7 @@
 """The frozen closed loop at one configuration: one law and one plant, contacts eliminated."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -19,9 +20,6 @@ from sealag.whole_body._signal_states import LawDerivative
 _DRIFT = 1e-9
 """1/s: a slower decay is none. Ten thousand times less is what rounding leaves of a zero root."""
 _MOST_DRIFTING = 8  # zero roots that are counted
-_WEIGHTS = (-9.0, 3.0)
-"""Powers of ten of what memory takes in against the command, between which the best is sought: a
-filter of 1e3 1/s takes in a thousand times more a second than it says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,39 +141,65 @@ class FrozenLoop(DelayedLoop):
             for name, columns in kinds.items()
         }
 
-    def jitter_ways(self) -> dict[str, float]:
-        """Return the jitter margin, s, of each way while the other's delay is constant.
+    def jitter_channels(self) -> dict[str, float]:
+        """Return the jitter margin, s, of each channel alone, of both ways and of all at once.
 
-        The signal passes both ways and the controller in between. Delays that vary do not commute
-        with its memory: a "command" that varies shifts what it says, C x(t − τ), a "measurement"
-        that varies shifts what it takes in. Without memory both are the jitter margin. The
-        command's part and the memory's of a measurement are weighted against each other, as a
-        multiplier X may.
+        "positions" (angles and torques) and "rates" are measured, the "command" goes down. With
+        memory ξ, what the law says of and memory takes in of each, and what it says of memory,
+
+            D_p y_p(t − σ) ,  G_p y_p(t − σ) ,  D_v y_v(t − σ) ,  G_v y_v(t − σ) ,  C_ξ ξ(t − σ)
+
+        are late by a delay of their own: a command that is late by τ shows what was measured at
+        t − τ − …, and delays that vary do not commute with memory. "both ways" takes positions and
+        rates of one message, "all" of two. The d of both counts the ways up and down together,
+        however they share it, and late torque feedback varies up to its own e meanwhile.
 
         Raises:
             SolverError: rounding leaves a norm open.
         """
-        from scipy.optimize import minimize_scalar
+        own = np.arange(len(self.states)) >= len(self.states) - self.memory
+        rates = np.array([name.startswith("d/dt ") for name in self.states]) & ~own
+        split = {"positions": self._measured(~rates & ~own), "rates": self._measured(rates)}
+        says = [(self.B, np.where(own, self.C, 0.0))]
+        found = {name: self._varying(parts, late=False) for name, parts in split.items()}
+        found["command"] = self._varying([(self.B, self.C)], late=False)
+        found["both ways"] = self._varying([*self._measured(~own), *says], late=True)
+        found["all"] = self._varying([*split["positions"], *split["rates"], *says], late=True)
+        # two delays tell more apart than one: what they tolerate, one does
+        found["both ways"] = max(found["both ways"], found["all"])
+        return found
 
-        command = self.jitter_margin().delay
-        if not self.memory:
-            return {"command": command, "measurement": command}
-        every = np.ones(len(self.states), dtype=bool)
+    def _measured(self, columns: BoolArray) -> list[tuple[Array, Array]]:
+        """B and C of what the command says, and of what memory takes in, of some states."""
+        plant = len(self.states) - self.memory
+        takes = np.where(columns, self.A_0[plant:], 0.0)
+        into = np.eye(len(self.states))[:, plant:]
+        return [(self.B, np.where(columns, self.C, 0.0)), (into, takes)]
 
-        def proven(power: float) -> float:
-            return self.late_measurement(every, weight=10.0**power).jitter_margin().delay
-
-        best = minimize_scalar(
-            lambda power: -proven(power), bounds=_WEIGHTS, method="bounded", options={"xatol": 0.1}
+    def _varying(self, parts: list[tuple[Array, Array]], *, late: bool) -> float:
+        """Jitter margin of the loop of which these parts, B and C, are late, each by itself; with
+        `late` the drives' torque feedback is, too."""
+        parts = [(B, C) for B, C in parts if C.any()]
+        if not parts:
+            return np.inf
+        B, C = np.hstack([B for B, _ in parts]), np.vstack([C for _, C in parts])
+        loop = DelayedLoop(
+            A_0=self.A_0 + self.B @ self.C - B @ C + (0.0 if late else self.A_e),
+            B=B,
+            C=C,
+            A_e=self.A_e if late else None,
+            embedded_delay=self.embedded_delay if late else 0.0,
+            symmetries=self.symmetries,
         )
-        return {"command": command, "measurement": -float(best.fun)}
+        edges = np.cumsum([0, *(len(C) for _, C in parts)]).tolist()
+        channels = {f"{k}": range(*ends) for k, ends in enumerate(pairwise(edges))}
+        return loop.jitter_margin(channels if len(parts) > 1 else None, alone=False).delay
 
-    def late_measurement(self, columns: BoolArray, *, weight: float = 1.0) -> "FrozenLoop":
+    def late_measurement(self, columns: BoolArray) -> "FrozenLoop":
         """Return the loop of which only some measured states are late, on their way up.
 
         Args:
             columns: (N,) which states; those of `memory` are the controller's own and never late.
-            weight: of what memory takes in against the command, in size; it moves no root.
         """
         plant = len(self.states) - self.memory
         takes = self.A_0[plant:].copy()
@@ -183,7 +207,7 @@ class FrozenLoop(DelayedLoop):
         C = self.C.copy()
         C[:, plant:] = 0.0
         size = float(np.linalg.norm(takes))
-        scale = weight * (float(np.linalg.norm(C)) or 1.0) / size if size else 1.0
+        scale = (float(np.linalg.norm(C)) or 1.0) / size if size else 1.0
         B = np.hstack([self.B, np.eye(len(self.states))[:, plant:] / scale])
         C = np.where(columns, np.vstack([C, scale * takes]), 0.0)
         A_0 = self.A_0 + self.B @ self.C - B @ C
