@@ -124,9 +124,7 @@ class Findings:
         withdrawn = proven is not bound
         decided = np.zeros(len(motion)) if printed else bound.delay
         local = local_of(along, decided, rest)
-        if (
-            rest is not None and rest.found and local.loop is None
-        ):  # a law that cannot run rests nowhere
+        if rest is not None and rest.found and local.loop is None:  # no law runs, none rests
             rest = replace(rest, found=False, reason=local.problem)
         worst = delayed_stiffness(along.at([int(np.argmin(proven.delay))]), system, kind)
         return cls(
