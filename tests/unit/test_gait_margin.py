@@ -1,10 +1,13 @@
 """The gait's own margin: the step-to-step map of the simulated walk, and its multipliers."""
 
+import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import sealag
 from sealag.delay import Constant, Delays, Link
 from sealag.design import load
 from sealag.errors import InputError
@@ -142,3 +145,27 @@ def test_a_margin_needs_a_walk_delays_and_whole_periods(case):
     gait = replace(case.walking.gait, step_time=0.3505)
     with pytest.raises(InputError, match=r"walking\.gait\.step_time"):
         replace(case, walking=replace(case.walking, gait=gait)).strides(1.0, held=1)
+
+
+def test_the_gait_s_margin_is_printed_and_is_json(cli, monkeypatch):
+    """A table of delays, then the margin; JSON has the same numbers."""
+    points = tuple(
+        GaitAtDelay(
+            delay_s=delay, residual=1e-9, multipliers=np.array(radii), error=1e-4, walks=walks,
+            reason=reason,
+        )
+        for delay, radii, walks, reason in (
+            (0.02, [0.6 + 0.2j, 0.6 - 0.2j], True, ""), (0.03, [], False, "the base is low"),
+        )
+    )  # fmt: skip
+    found = GaitMargin(points=points, design_s=0.02, neutral=4)
+    monkeypatch.setattr(sealag.System, "gait_margin", lambda self: found)
+    code, text, err = cli("margin", "bundled:hume", "--gait")
+    assert (code, err) == (0, "")
+    assert re.search(r"20\.000 ms +0\.632 +stable +goes on\n", text)
+    assert re.search(r"30\.000 ms +no gait +not stable falls +the base is low\n", text)
+    assert re.search(r"margin of the gait +20\.000 ms", text)
+    answer = json.loads(cli("margin", "bundled:hume", "--gait", "--json")[1])
+    assert (answer["gait_margin_s"], answer["falls_s"]) == (0.02, 0.03)
+    assert answer["points"][0]["multipliers"] == [[0.6, 0.2], [0.6, -0.2]]
+    assert answer["points"][1]["radius"] is None
