@@ -116,7 +116,7 @@ def _sweep_rates(project: str, *, as_json: bool) -> None:
         return
     show("rate          largest delay   proven          the design's, without the hold")
     for rate in rates:
-        # More commands wait than the exact loop can hold: only the proven one is known.
+        # too many commands wait for the exact loop: only the proven delay is known
         largest = "not found" if rate.largest_s is None else time_text(rate.largest_s)
         verdict = {True: "stable", False: "unstable", None: "open"}[rate.stable]
         show(
