@@ -162,3 +162,15 @@ def test_the_joint_that_falls_without_delay_is_named(tmp_path, cli):
     project.write_text(ARM.replace("elbow = 2.0", "elbow = 200.0"))
     answer = json.loads(cli("margin", project, "--json")[1])
     assert (answer["unstable_modes"], answer["falling"]) == (0, {})
+
+
+def test_the_gait_s_margin_needs_a_walk_and_stands_alone(cli):
+    code, text, err = cli("margin", BAXTER, "--gait")
+    assert (code, text) == (2, "")
+    assert "[walking]" in err
+    code, _, err = cli("margin", "bundled:hume", "--gait", "--rate-sweep")
+    assert code == 2
+    assert "two questions" in err
+    code, _, err = cli("margin", "bundled:hume", "--gait", "--horizon-ms", "20")
+    assert code == 2
+    assert "--gait is of the project's [walking] section" in err

@@ -9,9 +9,11 @@ USERS = ("tests", "bench", "examples", "studies")
 AT_KERNELS = {
     "tests/reference/test_kernels_control_law.py",
     "tests/reference/test_kernels_plant.py",
+    "tests/unit/test_gait_margin.py",
     "tests/unit/test_simulation_scenes.py",
 }
-"""Twins of kernels whose arrays only their room lays out, and a plant that is broken on purpose."""
+"""Twins of kernels whose arrays only their room lays out, a plant that is broken on purpose, and a
+walk that is saved, changed and restored."""
 TEXT = re.compile(r"\bsealag(?:\.\w+)*\._[a-z]\w*")
 """A private module by its dotted name, also as text for monkeypatch."""
 

@@ -23,7 +23,8 @@ SPRINGS = walking_law.Springs(
 )  # fmt: skip
 GAINS = walking_law.Gains(
     height_stiffness=100.0, posture_stiffness=110.0, swing_stiffness=400.0, height_damping=10.0,
-    posture_damping=11.0, swing_damping=20.0, planned=0.8, position_rate=10.0, damping=1e-14,
+    posture_damping=11.0, swing_damping=20.0, heading_stiffness=7.0, heading_damping=5.0,
+    planned=0.8, position_rate=10.0, damping=1e-14,
 )  # fmt: skip
 LEAD = walking_law.Lead(keep=0.7, time=5e-3, forward=1.0, feedback=0.5)
 
@@ -322,8 +323,18 @@ def test_law_against_its_plain_twin(hume, phase):
         drift = np.concatenate([com[2][2:], np.zeros(2), b[1 - stance]])
         return np.linalg.solve(rows @ X, wanted - drift - rows @ free)
 
+    def couple(turn):
+        """Torque of both feet: nothing but the yaw accelerates; the line through the feet stays."""
+        feet = np.vstack(J)
+        full = np.block([[at.M, -feet.T], [feet, np.zeros((6, 6))]])
+        X = np.linalg.solve(full, np.vstack([np.eye(NV)[:, -N:], np.zeros((6, N))]))[:NV]
+        rows = np.vstack([com[3][2], heading @ spin, com[3][:2], spin[2]])
+        return np.linalg.lstsq(rows @ X, turn * np.eye(N)[5], rcond=1e-8)[0]
+
     share = min(phase / transfer, 1.0)
     plain = share * support(0) + (1 - share) * support(1)
+    if phase < transfer:
+        plain += couple(4 * share * (1 - share) * np.clip(-7 * yaw - 5 * spin[2] @ v, -10, 10))
     np.testing.assert_allclose(tau, plain, rtol=1e-5, atol=1e-4)
     rows = np.vstack([J[0], com[3][2], heading @ spin, J[1], com[3][:2], spin[2]])
     speed = np.zeros(12)

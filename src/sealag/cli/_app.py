@@ -152,10 +152,18 @@ def margin(
             "--rate-sweep", help="Show what each sample rate of the controller tolerates instead."
         ),
     ] = False,
+    gait: Annotated[
+        bool,
+        typer.Option(
+            "--gait",
+            help="Show instead up to which constant delay the [walking] section's gait is stable, "
+            "and its simulation does not fall: minutes.",
+        ),
+    ] = False,
     **how: Unpack[Shown],
 ) -> None:
     """Compute the exact local delay margin of the frozen closed loop, along a motion."""
-    from sealag.cli._commands import margin_project
+    from sealag.cli._margin import asked_instead, margin_project
 
     margin_project(
         project,
@@ -163,7 +171,7 @@ def margin(
         columns=columns,
         quaternion=quaternion,
         horizon_ms=horizon_ms,
-        rate_sweep=rate_sweep,
+        instead=asked_instead(rate_sweep=rate_sweep, gait=gait),
         **how,
     )
 

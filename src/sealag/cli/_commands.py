@@ -1,23 +1,19 @@
 """Commands: each calls one function of the library and shows its answer."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from sealag import design
 from sealag.cli._json import show_json
-from sealag.cli._pictures import check_picture, drawn, of_margins, of_rates, show_picture
 from sealag.cli._terminal import show
 from sealag.errors import CertificateError, FileError, InputError, either
 from sealag.files import check_output, opened, write_text
 from sealag.passivity import Certificate, Status
 from sealag.robot import Motion
-from sealag.units import seconds_from_ms, time_text
 
-LONGEST_HORIZON_MS = 1e6
 STUDY = "humanoids2016"
 """The package that reproduces the paper: a guest, which the library does not import."""
 LARGEST_LIST = 250
@@ -32,14 +28,6 @@ _STATED = {
     Status.PASSIVE_ONLY: ": as it states, the design is passive only, not shown to be stable",
     Status.NOT_CERTIFIED: ": as it states, the design is not certified",
 }
-
-_JITTERS = {
-    "positions": "only positions vary",
-    "rates": "only rates vary",
-    "command": "only the command varies",
-    "all": "each varies by itself",
-}
-"""Channels of a jitter margin; both ways at once are the margin itself."""
 
 _BASES = {"auto": None, "floating": True, "fixed": False}
 
@@ -106,111 +94,6 @@ def note(text: str) -> None:
         text: the sentence.
     """
     show(f"sealag: {text}", error=True)
-
-
-def margin_project(
-    project: str,
-    motion: Path | None,
-    *,
-    columns: str | None,
-    quaternion: str | None,
-    horizon_ms: float | None,
-    rate_sweep: bool,
-    plot: Path | None,
-    as_json: bool,
-) -> None:
-    """Show the exact local margin at every instant, or at a sample of a long motion."""
-    if rate_sweep:
-        if any(given is not None for given in (motion, columns, quaternion, horizon_ms)):
-            raise InputError("--rate-sweep is of the project's posture: leave out the others.")
-        _sweep_rates(project, plot=plot, as_json=as_json)
-        return
-    if plot is not None and horizon_ms is None:
-        raise InputError(
-            "--plot of a margin shows unstable roots against delay, or what sample rates tolerate; "
-            "give --horizon-ms or --rate-sweep."
-        )
-    if horizon_ms is not None and not 0.0 < horizon_ms <= LONGEST_HORIZON_MS:
-        raise InputError(
-            f"--horizon-ms is {horizon_ms:g}; it must be more than 0 and at most "
-            f"{LONGEST_HORIZON_MS:g}."
-        )
-    system = design.load(project)
-    horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
-    check_picture(plot, *system.files, *([motion] if motion else []))
-    along = system.motion_of(motion, columns=columns, quaternion=quaternion, tell=note)
-    compile_kernels()
-    with busy("computing margins", along):
-        found = system.local_margins(along, horizon=horizon)
-    if plot is not None:
-        of_margins(found, system.name).write(plot)
-    answer: dict[str, Any] = found.summary()
-    if as_json:
-        show_json({**answer, **drawn(plot)})
-        return
-    covers = "any passive robot and environment, every delay below it"
-    passive = f"{time_text(found.passive_s):12} {covers}"
-    if found.not_passive:
-        passive = f"none: {found.not_passive}"
-    show(f"{'passive bound':26} {passive}")
-    varies = "both ways vary, every delay below it" if found.memory else "every delay below it"
-    show(f"{'jitter margin':26} {time_text(found.jitter_s):12} this robot, {varies}")
-    for name, value in found.jitter_channels_s.items():
-        if name in _JITTERS:
-            show(f"{f'  {_JITTERS[name]}':26} {time_text(value)}")
-    show(f"{'local margin':26} {time_text(found.delay_s):12} this robot, a constant delay: exact")
-    for name, value in found.channels_s.items():
-        show(f"{f'  only {name} late':26} {time_text(value)}")
-    if system.program is not None:
-        states = f"{found.memory} states" if found.memory else "no memory"
-        show(f"{'controller':26} {states}; nonlinear by {max(found.bend, 1e-6):.1g} of its answers")
-    show(f"{'delay of the design':26} {time_text(system.delays.d_1)}")
-    show(f"{'first crossing':26} {time_text(found.first_crossing_s)}")
-    if found.frequency_rad_s is not None:
-        show(f"{'frequency':26} {found.frequency_rad_s:.3f} rad/s")
-    show(f"{'unstable roots':26} {found.unstable_modes} without delay")
-    if found.falling:
-        show(f"{'  grows without delay':26} {_largest(found.falling)}")
-    show(f"{'zero roots of symmetries':26} {found.neutral}")
-    show(f"{'instant':26} {found.instant} of {found.instants}, at {found.time_s:.3f} s")
-    show(f"{'mode of first crossing':26} {_largest(found.mode)}")
-    for low, high, count in found.intervals:
-        show(f"{time_text(low):>14} to {time_text(high):14} {count} unstable roots")
-    show_picture(plot)
-
-
-def _largest(shares: Mapping[str, float]) -> str:
-    """The three joints that take the largest part in a motion."""
-    largest = sorted(shares.items(), key=lambda item: -item[1])[:3]
-    return ", ".join(f"{name} {share:.0%}" for name, share in largest)
-
-
-def _sweep_rates(project: str, *, plot: Path | None, as_json: bool) -> None:
-    """Show what each sample rate tolerates."""
-    system = design.load(project)
-    check_picture(plot, *system.files)
-    compile_kernels()
-    with busy("sampling the loop at each rate"):
-        rates = system.rate_sweep()
-    if plot is not None:
-        of_rates(rates, system.name).write(plot)
-    if as_json:
-        show_json({"rates": [rate.summary() for rate in rates], **drawn(plot)})
-        return
-    show("rate          largest delay   proven          the design's, without the hold")
-    for rate in rates:
-        # too many commands wait for the exact loop: only the proven delay is known
-        largest = "not found" if rate.largest_s is None else time_text(rate.largest_s)
-        verdict = {True: "stable", False: "unstable", None: "open"}[rate.stable]
-        show(
-            f"{rate.rate_hz:7.1f} Hz    {largest:15} {time_text(rate.proven_s):15} "
-            f"{time_text(rate.way_s)}, {verdict}"
-        )
-    lost = [f"{rate.rate_hz:g}" for rate in rates if rate.stable is False]
-    kept = [f"{rate.rate_hz:g}" for rate in rates if rate.stable]
-    parts = ((lost, "unstable"), (kept, "stable"))
-    show("; ".join(f"{', '.join(some)} Hz: {word}" for some, word in parts if some))
-    show_picture(plot)
 
 
 def verify_certificate(

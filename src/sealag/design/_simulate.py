@@ -14,7 +14,7 @@ from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.robot import ContactKind
-from sealag.simulation import Clock, Foot, Network, Push, Run, Scene, closed_loop
+from sealag.simulation import Clock, Foot, MeasuredGait, Network, Push, Run, Scene, closed_loop
 from sealag.typing import Array
 from sealag.units import seconds_from_ms
 from sealag.walking import GroundProfile, Walking
@@ -143,6 +143,23 @@ def _with_delay_storage(run: Run, system: Design, q: Array) -> Run:
     stored, error = run.delay_storage(Y, delay=delay)
     audit = replace(run.audit, delay_storage=stored, delay_storage_error=error)
     return replace(run, audit=audit)
+
+
+def gait_margin(system: Design, jobs: int) -> Any:
+    """Return what `System.gait_margin` does.
+
+    Args:
+        system: the design.
+        jobs: number of processes.
+    """
+    return MeasuredGait.margin(
+        system.robot,
+        system.actuators,
+        system.required_walking(),
+        delays=system.delays,
+        clock=_clock(system),
+        jobs=jobs,
+    )
 
 
 def _on_the_spot(walking: Walking) -> Walking:

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sealag.design._along import Along
 from sealag.design._criteria import certified_bounds
@@ -205,6 +205,28 @@ class System(Design):
             SolverError: rounding leaves a jitter margin open.
         """
         return rate_sweep(self, rates)
+
+    def gait_margin(self, *, jobs: int = 2) -> Any:
+        """Find up to which constant delay the [walking] section's gait is stable; see
+        docs/theory section 12.1.
+
+        The step-to-step map of the simulated walk on level ground is differentiated: links,
+        motors, delay lines and the controller's memory. All ways are late in the proportion of the
+        design's mean delays.
+
+        Args:
+            jobs: number of processes.
+
+        Returns:
+            Floquet multipliers at each delay that was tried, `delay_s`, the largest at which the
+            gait is stable, and `walks_s` and `falls_s`, between which the simulated walk falls.
+
+        Raises:
+            InputError: there is no walk, the delays are 0, or a step is no whole number of periods.
+        """
+        from sealag.design._simulate import gait_margin
+
+        return gait_margin(self, jobs)
 
     def certified_bounds(
         self, spaces: Spaces, rest: Rest | None = None, motion: Motion | None = None

@@ -23,6 +23,10 @@ from sealag.kernels.spatial import rotate, rotation
 from sealag.kernels.walking import quintic_values
 from sealag.typing import Array
 
+_TURN = 10.0
+"""rad/s²: the yaw's acceleration in double support at most. On Hume it takes 20 N of each foot; ten
+times more slides, ten times less does not hold the heading."""
+
 
 class Reference(NamedTuple):
     """What is wanted now."""
@@ -45,6 +49,8 @@ class Gains(NamedTuple):
     height_damping: float  # 1/s
     posture_damping: float  # 1/s
     swing_damping: float  # 1/s
+    heading_stiffness: float  # 1/s², in double support
+    heading_damping: float  # 1/s
     planned: float  # share of the planned acceleration
     position_rate: float  # at which swing errors enter the planned rates, 1/s
     damping: float  # of the solutions, see `linalg.least_squares`
@@ -213,14 +219,14 @@ def task_torques(scratch, J_t, wanted, damping, tau):
 
 @inner
 def _posture(R, v, heading):
-    """Write the heading (2, 3) of a base rotation; return roll, pitch and the turn rate."""
+    """Write the heading (2, 3) of a base rotation; return roll, pitch, yaw and the turn rate."""
     (front, _, _), (left, _, _), (slope, tilt, up) = R
     yaw = math.atan2(left, front)
     heading[0, 0], heading[0, 1] = math.cos(yaw), math.sin(yaw)
     heading[1, 0], heading[1, 1] = -math.sin(yaw), math.cos(yaw)
     heading[0, 2], heading[1, 2] = 0.0, 0.0
     pitch = math.asin(min(1.0, max(-1.0, -slope)))
-    return math.atan2(tilt, up), pitch, rotate(R, (v[3], v[4], v[5]))
+    return math.atan2(tilt, up), pitch, yaw, rotate(R, (v[3], v[4], v[5]))
 
 
 @entry
@@ -272,7 +278,7 @@ def law(biped, wish):
     for c in range(nv):
         h[c] = weight * terms.com_jacobian[2, c] if wish.still else terms.nle[c]
     heading, other, wanted, velocity = scratch.heading, 1 - stance, scratch.wanted, scratch.velocity
-    roll, pitch, (turn_x, turn_y, turn_z) = _posture(rotation(terms.rotation, 1), v, heading)
+    roll, pitch, yaw, (turn_x, turn_y, turn_z) = _posture(rotation(terms.rotation, 1), v, heading)
     z, z_rate, z_bend = quintic_values(wish.height, wish.height_time)
     wanted[:], velocity[:] = 0.0, 0.0
     wanted[0] = gains.planned * z_bend + gains.height_stiffness * (z - terms.com[2])
@@ -304,6 +310,9 @@ def law(biped, wish):
         share = wish.phase / wish.transfer_time
         for j in range(back.size):
             biped.tau[j] = share * biped.tau[j] + (1.0 - share) * back[j]
+        if gains.heading_stiffness > 0.0:
+            turn = -gains.heading_stiffness * yaw - gains.heading_damping * turn_z
+            _turn(biped, 4.0 * share * (1.0 - share) * min(max(turn, -_TURN), _TURN))
     velocity[3], velocity[11] = z_rate, turn_z
     velocity[9], velocity[10] = terms.com_velocity[0], terms.com_velocity[1]
     least_squares(rows, velocity, gains.damping, scratch.solution, scratch.large)
@@ -326,6 +335,36 @@ def _rows(J, R, heading, com_jacobian, stance, rows):
         rows[11, 3 + c] = R[2, c]
         for i in range(2):
             rows[4 + i, 3 + c] = heading[i, 0] * R[0, c] + heading[i, 1] * R[1, c]
+
+
+@inner
+def _turn(biped, wanted):
+    """Add the torque that turns the base about the vertical while both feet stand.
+
+    The feet push as a couple: CoM, roll and pitch are not accelerated.
+
+    Args:
+        biped: tau is moved.
+        wanted: acceleration of the yaw, rad/s².
+    """
+    scratch, rows, J_t = biped.scratch, biped.scratch.rows, biped.scratch.turned
+    contact, back = scratch.contact, scratch.back
+    for f in range(2):
+        copy(biped.feet.J[f, :3], contact[f])
+        for a in range(3):
+            scratch.drift[f, a] = biped.feet.drift[f, a]
+    count, nv = 2 * contact.shape[1], contact.shape[2]
+    constrain(
+        scratch.M_inverse, scratch.h, contact.reshape(count, nv), scratch.drift.reshape(count),
+        scratch,
+    )  # fmt: skip
+    copy(rows[3:6], J_t)
+    copy(rows[9:12], J_t[3:])
+    scratch.a_0[:], scratch.b_t[:], scratch.wanted[:] = 0.0, 0.0, 0.0
+    scratch.wanted[5] = wanted
+    task_torques(scratch, J_t, scratch.wanted, biped.gains.damping, back)
+    for j in range(back.size):
+        biped.tau[j] += back[j]
 
 
 @inner

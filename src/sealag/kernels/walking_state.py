@@ -25,6 +25,10 @@ from sealag.kernels.spatial import (
 from sealag.kernels.walking_law import constrain
 from sealag.typing import Array
 
+SAME = 1e-6
+"""Of a period: instants this close are one. Without it rounding decides whether a command has
+arrived where delays end halfway between ticks, and no walk becomes periodic."""
+
 
 class Links(NamedTuple):
     """Terms of the links at the measured instant; feet in the order left behind, stood on."""
@@ -72,7 +76,7 @@ def predict(links, biped, timing):
         return
     mode = -1
     for i in range(timing.ticks):
-        t = timing.measured + (i + 0.5) * period
+        t = timing.measured + (i + 0.5 + SAME) * period
         now = 0 if t < timing.touchdown else (1 if t < timing.lift_off else 2)
         if now != mode:
             mode = now

@@ -5,7 +5,11 @@ from typing import Self
 
 import numpy as np
 
+from sealag.actuation import Actuators
+from sealag.delay import Delays
 from sealag.robot import Robot, Workspace
+from sealag.simulation._gait_margin import GaitCase, GaitMargin
+from sealag.simulation._network import Clock
 from sealag.simulation._outcome import EventKind, Outcome
 from sealag.simulation._run import Run
 from sealag.typing import Array, IntArray
@@ -93,6 +97,34 @@ class MeasuredGait:
             step_width=lateral * np.diff(place[:, 1]),
             com=com,
         )
+
+    @staticmethod
+    def margin(
+        robot: Robot,
+        actuators: Actuators,
+        walking: Walking,
+        *,
+        delays: Delays,
+        clock: Clock,
+        jobs: int = 2,
+    ) -> GaitMargin:
+        """Find up to which constant delay a gait on level ground is stable, see `GaitCase.margin`.
+
+        Args:
+            robot: Robot, as the controller knows it.
+            actuators: Springs and motors likewise.
+            walking: The walk; its ground is taken as level.
+            delays: The design's; all ways are late in the proportion of their means.
+            clock: Periods.
+            jobs: Number of processes.
+
+        Raises:
+            InputError: The delays are 0, or the robot cannot walk so.
+        """
+        case = GaitCase(
+            robot=robot, actuators=actuators, walking=walking, delays=delays, clock=clock
+        )
+        return case.margin(jobs=jobs)
 
     @property
     def steps(self) -> int:

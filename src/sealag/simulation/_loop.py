@@ -76,7 +76,7 @@ def closed_loop(
         InputError: An input cannot be simulated: shapes, no duration, a foot inside the ground,
             no contact forces that can hold the first state.
     """
-    loop = _Loop(
+    loop = Loop(
         robot, actuators, controller, network or Network.ideal(), clock or Clock(),
         scene or Scene(), seed,
     )  # fmt: skip
@@ -101,7 +101,7 @@ def _state(name: str, value: Array | None, size: int) -> Array:
     return array
 
 
-class _Loop:
+class Loop:
     """One run's plant, links, controller and storage."""
 
     def __init__(
@@ -185,7 +185,7 @@ class _Loop:
         return answer(found.x)
 
     # Plan --------------------------------------------------------------------------------------
-    def _plan(self, steps: int, every: int) -> None:
+    def plan(self, steps: int, every: int) -> None:
         """Lay out all that happens: loads, samples, ticks and takings, and what is logged."""
         kernel, step = self._kernel, self.clock.physics
         self.plant.held.command[:], self.plant.held.known_torque[:] = self.first, 0.0
@@ -200,17 +200,28 @@ class _Loop:
             torque=self.clock.steps_of("embedded", self.clock.embedded or step),
             torque_period=self.clock.embedded or step,
         )
-        self._channels = open_channels(
+        self.channels = open_channels(
             ways, events_of(ways, self.scene.pushes), self._periods.torque_period,
             first=self.first, torque=self.plant.now.tau_sea, row=self.truth.data.size,
             work=self._given.work,
         )  # fmt: skip
         self._course = self._course_of(self._periods)
+        self.cursor = kernel.Cursor(0.0, 0, 0, kernel.WATCH)
+
+    def go_on(self, steps: int, interrupt: Interrupt) -> None:
+        """Go on to the end of a physics step, of those that are planned.
+
+        Raises:
+            PlantStop: The robot fell or a step cannot be completed before.
+            SealagError: The controller failed.
+        """
+        self._course = self._course_of(self._periods._replace(steps=steps))
+        self._glide(None, interrupt)
 
     def _course_of(self, periods: "Periods") -> Any:
         """Return the run of some length, as kernels take it."""
         kernel = self._kernel
-        return keep(kernel.Course(self._channels, periods, self._limits, self._log))
+        return keep(kernel.Course(self.channels, periods, self._limits, self._log))
 
     def _fall_limits(self) -> "Limits":
         fall, height, tilt, up = self.scene.fall, -math.inf, -math.inf, np.zeros((1, 3))
@@ -239,7 +250,7 @@ class _Loop:
             raise InputError(
                 f"the duration {duration} s is shorter than a step of {self.clock.physics} s"
             )
-        self._plan(steps, self.clock.steps_of("log", log_period))
+        self.plan(steps, self.clock.steps_of("log", log_period))
         outcome, message = Outcome.COMPLETED, ""
         try:
             self._glide(progress, interrupt)
@@ -258,7 +269,7 @@ class _Loop:
             outcome, message = Outcome.INTERRUPTED, f"stopped at t = {self.plant.time:.4f} s"
         if not self._filled():
             still = self._course_of(self._periods._replace(steps=0))
-            closing = self._kernel.Cursor(0.0, 0, len(self._channels.due), self._kernel.CLOSE)
+            closing = self._kernel.Cursor(0.0, 0, len(self.channels.due), self._kernel.CLOSE)
             self.plant.glide(still, closing, math.inf)
         return outcome, message
 
@@ -268,13 +279,13 @@ class _Loop:
 
     def _glide(self, progress: Callable[[float], None] | None, interrupt: Interrupt) -> None:
         """Go on from one thing that needs Python to the next, until the end."""
-        kernel, plant, channels = self._kernel, self.plant, self._channels
-        cursor, course = kernel.Cursor(0.0, 0, 0, kernel.WATCH), self._course
+        kernel, plant, channels = self._kernel, self.plant, self.channels
+        course = self._course
         shown, every = 0, max(1, round(0.1 / self.clock.physics))
         while True:
             interrupt.check()
-            why, plant.time, cursor = plant.glide(course, cursor, self._said)
-            time, step, event, part = cursor
+            why, plant.time, self.cursor = plant.glide(course, self.cursor, self._said)
+            time, step, event, part = self.cursor
             if step > shown:  # what was there then is logged
                 release(*self._log)
                 if progress is not None:
@@ -289,7 +300,7 @@ class _Loop:
             elif why == kernel.BLOCKED:
                 plant.advance(time, plant.held.command, plant.held.known_torque)
             else:
-                cursor = kernel.Cursor(time, step, event + 1, part)
+                self.cursor = kernel.Cursor(time, step, event + 1, part)
                 if channels.kind[event] == kernel.TICK:
                     self._tick(int(channels.tick[event]))
                 else:
@@ -315,7 +326,7 @@ class _Loop:
         self.plant.push(load)
 
     def _tick(self, tick: int) -> None:
-        channels, t = self._channels, float(self.exchanges.tick[tick])
+        channels, t = self.channels, float(self.exchanges.tick[tick])
         self.received.data[:] = channels.samples[tick % len(channels.samples)]
         command = channels.commands[tick % len(channels.commands)]
         command[:] = 0.0
@@ -329,7 +340,7 @@ class _Loop:
 
     def _state(self) -> None:
         """Let the controller state its undelayed command and its potential."""
-        time, channels = self.plant.time, self._channels
+        time, channels = self.plant.time, self.channels
         if self._storage is not None and time != self._said:
             self.plant.sense(time, self.truth.data)
             channels.storage[0] = self._ask(self._storage, time, self.truth, self._given.command)

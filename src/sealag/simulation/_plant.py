@@ -206,6 +206,15 @@ class Plant:
             tuple(cursor), said,
         )  # fmt: skip
 
+    def refresh(self) -> None:
+        """Evaluate the present instant after its state was set from outside.
+
+        Raises:
+            PlantStop: No contact forces can hold it.
+        """
+        self._evaluate()
+        self.surroundings.measure_gaps(self.now)
+
     def push(self, load: Array) -> None:
         """Let other forces act on the loaded frames from now on.
 

@@ -10,6 +10,7 @@ from sealag.errors import InputError, SolverError
 from sealag.kernels import keep
 from sealag.robot import Robot
 from sealag.typing import Array
+from sealag.walking._carried import Carried
 from sealag.walking._estimator import Body, Estimator, biped_of
 from sealag.walking._feet import Side
 from sealag.walking._gait import WalkingGait
@@ -80,7 +81,7 @@ class WalkingController:
         self._ground, self._period = ground, period
         self.gait, self.options = gait, options
         self._body = Body(robot, feet)
-        gains, lead = _gains(self.options, period)
+        gains, lead = _gains(self.options, gait, period)
         biped = biped_of(robot, actuators, self._body, feet, period=period, gains=gains, lead=lead)
         self._biped, self.tau_task, self._first = keep(biped), biped.tau, True
         self._tau_sea = biped.tau_sea
@@ -176,6 +177,12 @@ class WalkingController:
         self.tick(0.0, first, np.zeros(robot.n))
         return first.q_joint + self.tau_task / self._actuators.spring_stiffness
 
+    def memory(self) -> list[Carried]:
+        """Return all that one tick leaves to the next, for whoever saves and restores a walk."""
+        own = Carried(self, ("_first",), ())
+        parts = (self.step, self.placement, self._estimator)
+        return [own, *(one for part in parts for one in part.memory())]
+
     # State ---------------------------------------------------------------------------------------
     def _observe(self, measurement: Measurement, now: float) -> None:
         """Estimate and predict the state, and evaluate the robot's terms there."""
@@ -202,13 +209,16 @@ class WalkingController:
             self.placement.restart()
 
 
-def _gains(options: WalkingOptions, period: float) -> "tuple[Gains, Lead]":
+def _gains(options: WalkingOptions, gait: WalkingGait, period: float) -> "tuple[Gains, Lead]":
     """Return gains and lead of the law."""
     from sealag.kernels.walking_law import Gains, Lead
 
     def damping(stiffness: float) -> float:
         return 2.0 * options.task_damping * math.sqrt(stiffness)
 
+    # The couple acts in double support only, and there as 4 s (1 - s): on average over a step as
+    # this share of itself, which scales stiffness and damping alike.
+    acting = 2.0 / 3.0 * gait.transfer_time / gait.step_time
     gains = Gains(
         height_stiffness=float(options.height_stiffness),
         posture_stiffness=float(options.posture_stiffness),
@@ -216,6 +226,8 @@ def _gains(options: WalkingOptions, period: float) -> "tuple[Gains, Lead]":
         height_damping=damping(options.height_stiffness),
         posture_damping=damping(options.posture_stiffness),
         swing_damping=damping(options.swing_stiffness),
+        heading_stiffness=float(options.heading_stiffness),
+        heading_damping=damping(options.heading_stiffness / acting),
         planned=1.0 if options.acceleration_feedforward else 0.0,
         position_rate=float(options.position_rate),
         damping=_DAMPING,

@@ -1,5 +1,6 @@
 """State estimation of the walking controller: body terms, leg odometry, prediction."""
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from sealag.actuation import Actuators
 from sealag.robot import Robot
 from sealag.typing import Array
+from sealag.walking._carried import Carried
 from sealag.walking._feet import Side
 from sealag.walking._options import Prediction
 from sealag.walking._step import StepReferences
@@ -104,9 +106,10 @@ class Estimator:
     def __init__(
         self, biped: "Biped", kept: Any, *, period: float, prediction: Prediction, odometry: bool
     ) -> None:
-        from sealag.kernels.walking_state import Timing, foresee
+        from sealag.kernels.walking_state import SAME, Timing, foresee
 
         self._timing, self._foresee, self._biped, self._kept = Timing, foresee, biped, kept
+        self._same = SAME
         self._period, self._prediction, self._odometry = period, prediction, odometry
         self._stance, self._newest, self._any = 0, 0, False
 
@@ -120,6 +123,18 @@ class Estimator:
         # A plain integer: kernels take ten times as long to recognise an enumeration.
         self._biped.anchor[:], self._stance = feet, int(stance)
         self._biped.flight.arrival[:], self._newest, self._any = -np.inf, 0, False
+
+    def memory(self) -> list[Carried]:
+        """Return what is carried from tick to tick: anchors, torques, and commands in flight."""
+        biped, stiffness = self._biped, float(self._biped.springs.stiffness.max())
+        torques = ((biped.tau, ()), (biped.smooth, ()), (biped.tau_sea, ()))
+        flight = biped.flight
+        return [
+            Carried(self, ("_stance", "_any"), ((biped.anchor, (0, 3)),)),
+            Carried(self, (), torques, units=stiffness),
+            Carried(self, ("_newest",), ((flight.command, ()),), ring="_newest", units=stiffness),
+            Carried(self, (), ((flight.arrival, ()),), units=math.inf),
+        ]
 
     def sent(self, command: Array, arrival: float) -> None:
         """Add a command to those in flight.
@@ -148,7 +163,7 @@ class Estimator:
             measured: Instant of the measurement, s.
             now: Instant to predict, s.
         """
-        ticks = round((now - measured) / self._period)
+        ticks = math.floor((now - measured) / self._period + 0.5 + self._same)
         if self._prediction == Prediction.VELOCITY:
             ticks = -ticks
         elif self._prediction == Prediction.NONE or not self._any:

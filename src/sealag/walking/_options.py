@@ -52,6 +52,8 @@ class WalkingOptions:
         height_stiffness: K_x of the CoM height, 1/s².
         posture_stiffness: K_x of torso roll and pitch, 1/s².
         swing_stiffness: K_x of the swing foot, 1/s².
+        heading_stiffness: Of the heading, forward, in double support, where two feet can push as a
+            couple, 1/s²; 0 leaves the yaw free, as a single point foot does.
         momentum_placement: The footstep is placed by the angular momentum about the stance foot
             (legs included), not by the CoM velocity.
         bias_gain: Share of a step's error of apex speed that is corrected in the next, against
@@ -82,6 +84,7 @@ class WalkingOptions:
     height_stiffness: float = ranged(100.0, 0.0, 1e6, "1/s²")
     posture_stiffness: float = ranged(100.0, 0.0, 1e6, "1/s²")
     swing_stiffness: float = ranged(400.0, 0.0, 1e6, "1/s²")
+    heading_stiffness: float = ranged(0.0, 0.0, 1e6, "1/s²")
     momentum_placement: bool = True
     bias_gain: float = ranged(0.3, 0.0, 10.0)
     placement_time: float = ranged(0.05, 0.0, 10.0, "s")
@@ -109,6 +112,7 @@ class WalkingOptions:
             "lead": False,
             "torque_feedback": 0.0,
             "task_damping": 0.0,
+            "heading_stiffness": 0.0,
             "feedback": JointAngles.STATIC_JOINT,
         }
         return replace(self, **{**options, **changes})

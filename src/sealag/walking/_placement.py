@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sealag.typing import Array
+from sealag.walking._carried import Carried
 from sealag.walking._gait import WalkingGait
 from sealag.walking._options import WalkingOptions
 from sealag.walking._step import StepReferences
@@ -42,7 +43,21 @@ class Placement:
         self._wanted = tuple(wanted)
         self._end, self._momentum = np.zeros((2, 2)), np.zeros(2)
         self._fresh = True
-        self._started, self._before, self._faster = False, 0.0, 0.0
+        self._started, self._before, self._speed = False, 0.0, np.zeros(1)
+
+    def memory(self) -> list[Carried]:
+        """Return what is carried from tick to tick: average, and correction of the speed."""
+        numbers = ("_fresh", "_started", "_before")
+        return [Carried(self, numbers, ((self._end, (0,)), (self._speed, ())))]
+
+    @property
+    def _faster(self) -> float:
+        """Relative correction of the speed."""
+        return float(self._speed[0])
+
+    @_faster.setter
+    def _faster(self, value: float) -> None:
+        self._speed[0] = value
 
     def restart(self) -> None:
         """Forget the average: a new step begins."""

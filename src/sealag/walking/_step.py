@@ -3,6 +3,7 @@
 import numpy as np
 
 from sealag.typing import Array
+from sealag.walking._carried import Carried
 from sealag.walking._feet import Side
 from sealag.walking._gait import WalkingGait
 from sealag.walking._ground import Ground
@@ -51,20 +52,32 @@ class StepReferences:
             step_time=gait.step_time, transfer_time=gait.transfer_time, still=_STILL,
             search=_SEARCH,
         )  # fmt: skip
-        self._lift, self._bump = 0.0, gait.clearance
+        self._path = np.array([0.0, gait.clearance])  # m: begin of the swing, middle above the line
 
     def _stand(self, stance: Side) -> None:
         """Stand on a foot; the numbers are plain integers, as kernels take them."""
         self.stance, self.swing_foot = int(stance), int(stance.other)
         self.outward = stance.other.lateral
 
+    def memory(self) -> list[Carried]:
+        """Return what is carried from tick to tick."""
+        places = ((self.new, (0,)), (self.old, (0,)), (self.target, (0,)), (self.swing, (0,)))
+        numbers = ("stance", "swing_foot", "outward", "swinging", "offset")
+        return [
+            Carried(self, numbers, (*places, (self.height, ()), (self._path, ())), clock="begin")
+        ]
+
     def foot_height(self, x: float, y: float) -> float:
         """Return the height (m) of a foot's frame that stands at ``x``, ``y``."""
         return self._ground.height(x, y) + self._gait.foot_radius
 
     def phase(self, t: float) -> float:
-        """Return the time since the step's touchdown, s."""
-        return t - self.begin
+        """Return the time since the step's touchdown, s.
+
+        Instants closer than a nanosecond are one: else rounding would decide in which tick the
+        weight transfer ends.
+        """
+        return round(t - self.begin, 9)
 
     def start(
         self, t: float, stance: Side, *, phase: float, com: Array, feet: Array, swing: Array
@@ -85,7 +98,7 @@ class StepReferences:
         self.old[:] = self.new
         self.old[0] -= self._length
         self.old[1] += self.outward * self._gait.step_width
-        self._lift = self.foot_height(self.old[0], self.old[1])
+        self._path[0] = self.foot_height(self.old[0], self.old[1])
         self._now[:] = com[0], com[1], 0.0
         self._aim()
         self.swing[0], self.swing[1], self.swing[2] = feet[self.swing_foot], swing, 0.0
@@ -125,7 +138,7 @@ class StepReferences:
     def lift(self, foot: Array) -> None:
         """Begin the swing at the foot's position (3,), m."""
         self.swing[0], self.swing[1:] = foot, 0.0
-        self._lift = float(foot[2])
+        self._path[0] = foot[2]
         self.swinging = True
         self._clear()
 
@@ -135,18 +148,13 @@ class StepReferences:
         excess = 0.0
         for u in (0.2, 0.35, 0.5, 0.65, 0.8):
             x, y = start[:2] + u * (end[:2] - start[:2])
-            line = self._lift + u * (end[2] - self._lift)
+            line = self._path[0] + u * (end[2] - self._path[0])
             excess = max(excess, self.foot_height(float(x), float(y)) - line)
-        self._bump = self._gait.clearance + excess
+        self._path[1] = self._gait.clearance + excess
 
     def move(self, t: float, period: float) -> None:
         """Move the swing reference to ``t`` (s), one ``period`` (s) after the last."""
+        lift, bump = self._path.tolist()
         self._kernel.swing(
-            self.swing,
-            self.target,
-            self.phase(t),
-            period,
-            tuple(self._plan),
-            self._lift,
-            self._bump,
+            self.swing, self.target, self.phase(t), period, tuple(self._plan), lift, bump
         )
