@@ -13,7 +13,6 @@ import numpy as np
 
 from sealag.errors import FileError, MotionError, SealagError
 from sealag.files import opened
-from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.units import number_of
 
@@ -205,6 +204,8 @@ def recorded_columns(signals: Mapping[str, Mapping[str, Array]]) -> dict[str, Ar
             `<joint>:velocity`, and as far as there are any /base and /contact as `Run.signals` has
             them.
     """
+    from sealag.simulation import Run
+
     columns = dict(signals["/time"])
     columns |= signals.get("/base", {})
     for name, values in signals["/joint_states"].items():
