@@ -46,6 +46,7 @@ TESTS = {
               "tests/cli/test_cli_bad_input.py tests/cli/test_cli_margin.py",
     "motion": "tests/unit/test_motion_columns.py tests/unit/test_motion_base.py",
     "simulation": "tests/unit/test_simulation_scenario_settings.py "
+                  "tests/reference/test_kernels_run.py "
                   "tests/unit/test_simulation_energy.py tests/unit/test_simulation_exchange.py "
                   "tests/unit/test_simulation_damping.py tests/unit/test_simulation_ground.py "
                   "tests/unit/test_simulation_scenes.py tests/oracle/test_simulation_analytic.py "
@@ -558,8 +559,6 @@ MUTANTS = [
          "injection[rows] = command[rows].sum(axis=1)", "what the delay injects"),
         ("own[rows] = given + potential[rows] - potential[:1]",
          "own[rows] = given + potential[rows]", "what the law injects"),
-        ("return 0.5 * (start[1] + end[1]), end[0] - start[0]",
-         "return start[1], end[0] - start[0]", "the trapezoid"),
         ("lambda row: damping[row] - command[row]", "lambda row: command[row] - damping[row]",
          "the joint that is named on the joint side"),
     ),
@@ -569,6 +568,10 @@ MUTANTS = [
          "speeds at the middle of a step"),
         ("command = held.command[j] if begin < held.change[0] else held.later[j]",
          "command = held.command[j]", "a command that changes inside a step"),
+    ),
+    *_of(
+        "simulation", "kernels/run.py",
+        ("part = 0.5 * (done.command[1, j] + force) *", "part = force *", "the trapezoid"),
     ),
     *_of(
         "simulation", "simulation/_network.py",

@@ -1,17 +1,20 @@
 """`sealag.certify`: from a design, or its project file, and a motion to a certificate."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sealag.design._project import loaded
 from sealag.design._system import PROOF_COUNT, System
 from sealag.passivity import Certificate, Criterion, Solver
 from sealag.robot import Motion
-from sealag.simulation import Run
+
+if TYPE_CHECKING:
+    from sealag.simulation import Run
 
 
 def certify(
     project: System | str | Path,
-    motion: Motion | Run | str | Path | None = None,
+    motion: "Motion | Run | str | Path | None" = None,
     *,
     criterion: Criterion | str | None = None,
     time_varying: bool = False,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from sealag.design._motion_table import CONTACT, RECORDING, read_table, recorded
 from sealag.errors import InputError, MotionError, SealagError
 from sealag.files import written_whole
 from sealag.robot import Contact, Motion, Robot
-from sealag.simulation import Run
 from sealag.store import Store, blocks, release
 from sealag.typing import Array
+
+if TYPE_CHECKING:
+    from sealag.simulation import Run
 
 _LATEST = 1e12  # s
 _SHORTEST = 1e-9  # s between two rows, that velocities stay numbers
@@ -65,7 +68,7 @@ def load_motion(
     return motion
 
 
-def motion_of_run(run: Run, system: Design) -> Motion:
+def motion_of_run(run: "Run", system: Design) -> Motion:
     """Return what a run moved through.
 
     Args:

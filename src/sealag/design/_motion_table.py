@@ -13,8 +13,6 @@ import numpy as np
 
 from sealag.errors import FileError, MotionError, SealagError
 from sealag.files import opened
-from sealag.report import read_recording
-from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.units import number_of
 
@@ -177,6 +175,8 @@ _READERS = {".csv": _read_csv, ".npz": _read_npz, ".parquet": _read_parquet}
 
 def _recorded(path: Path, tell: Callable[[str], None]) -> dict[str, dict[str, Array]]:
     """Signals of a recording by topic and name, as far as all of them go, and its time."""
+    from sealag.report import read_recording
+
     recording = read_recording(path)
     found = {
         topic: signal
@@ -204,6 +204,8 @@ def recorded_columns(signals: Mapping[str, Mapping[str, Array]]) -> dict[str, Ar
             `<joint>:velocity`, and as far as there are any /base and /contact as `Run.signals` has
             them.
     """
+    from sealag.simulation import Run
+
     columns = dict(signals["/time"])
     columns |= signals.get("/base", {})
     for name, values in signals["/joint_states"].items():

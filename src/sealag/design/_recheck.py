@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,8 +14,10 @@ from sealag.design._system import System
 from sealag.errors import InputError
 from sealag.passivity import Certificate, Criterion, InstantProof, LocalLoop, Verification
 from sealag.robot import Motion
-from sealag.simulation import Run
 from sealag.typing import Array
+
+if TYPE_CHECKING:
+    from sealag.simulation import Run
 
 _Check = tuple[str, bool, str]
 """Name, whether it holds, and detail."""
@@ -41,7 +43,7 @@ at different points. `verify` checks them from the file; the checks below compar
 def verify_design(
     certificate: Path | str | Mapping[str, Any],
     project: System | str | Path,
-    motion: Motion | Run | str | Path | None = None,
+    motion: "Motion | Run | str | Path | None" = None,
     *,
     exact: bool = False,
 ) -> Verification:

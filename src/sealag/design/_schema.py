@@ -105,7 +105,8 @@ def _by_shape(value: Any) -> str:
 class Section(BaseModel):
     """A table of the project file; unknown keys are refused, and so is text for a number."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    # A section is checked with its file: validators of its own would cost time at each start.
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
 
 class RobotSection(Section):

@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sealag.design._along import Along
 from sealag.design._criteria import certified_bounds
@@ -17,9 +18,11 @@ from sealag.design._standing import standing_warnings
 from sealag.errors import InputError, either
 from sealag.passivity import Bound, Criterion, Solver
 from sealag.robot import Motion
-from sealag.simulation import Run
 from sealag.typing import Array
 from sealag.whole_body import Rest, Spaces
+
+if TYPE_CHECKING:
+    from sealag.simulation import Run
 
 MOST_INSTANTS = 1_400_000
 """Instants of one certificate: its file has at most 100 MB, and up to 70 bytes an instant."""
@@ -95,7 +98,7 @@ class System(Design):
 
     def motion_of(
         self,
-        given: Motion | Run | str | Path | None = None,
+        given: "Motion | Run | str | Path | None" = None,
         *,
         columns: Mapping[str, str] | str | Path | None = None,
         quaternion: str | None = None,
@@ -121,11 +124,13 @@ class System(Design):
             raise InputError("columns and quaternion are of a motion's file; name it (--motion).")
         if chosen is None:
             return self.still()
+        if isinstance(chosen, Motion):
+            return chosen
+        from sealag.simulation import Run
+
         if isinstance(chosen, Run):
             return motion_of_run(chosen, self)
-        if not isinstance(chosen, Motion):
-            raise InputError(f"motion is {chosen!r}; a Motion, a Run or a file's path is needed.")
-        return chosen
+        raise InputError(f"motion is {chosen!r}; a Motion, a Run or a file's path is needed.")
 
     def save_motion(self, motion: Motion, path: str | Path) -> None:
         """Write a motion of the robot as CSV, NPZ or Parquet through a temporary name.
@@ -163,7 +168,7 @@ class System(Design):
         return local_of(Along.of(self, motion), bounds, rest)
 
     def local_margins(
-        self, motion: Motion | Run | str | Path | None = None, *, horizon: float | None = None
+        self, motion: "Motion | Run | str | Path | None" = None, *, horizon: float | None = None
     ) -> LocalMargins:
         """Decide the exact local margin of the law that runs, and its jitter margin, over a motion.
 
@@ -223,7 +228,7 @@ class System(Design):
 
     def criterion_asked(
         self,
-        motion: Motion | Run | str | Path | None = None,
+        motion: "Motion | Run | str | Path | None" = None,
         criterion: Criterion | str | None = None,
         *,
         time_varying: bool = False,
@@ -261,7 +266,7 @@ class System(Design):
 
     def findings(
         self,
-        motion: Motion | Run | str | Path | None = None,
+        motion: "Motion | Run | str | Path | None" = None,
         criterion: Criterion | str | None = None,
         *,
         time_varying: bool = False,

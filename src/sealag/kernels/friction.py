@@ -16,7 +16,14 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.kernels._jit import inner
-from sealag.kernels.linalg import backward_solve, cholesky, copy, forward_solve
+from sealag.kernels.linalg import (
+    backward_solve,
+    cholesky,
+    copy,
+    eliminate,
+    forward_solve,
+    substitute,
+)
 from sealag.typing import Array, IntArray
 
 SETTLED, INCONSISTENT, UNSOLVABLE = 0, 1, 2  # how `settle` ends
@@ -25,6 +32,10 @@ _CONE = 1e-10
 times smaller is lost in the rounding of forces."""
 _TORSION = 1e-10  # Nm: changes of torsional torque that count as none
 _ITERATIONS = 200
+_TOGETHER = 6
+"""Iterations in which all sliding points move together; three mostly suffice. Twice as many only
+delay the search point by point, which ends where this one does not."""
+_PIVOT = 1e-6  # of a point's own rate: below it, points cannot be told apart and move one by one
 _STALE = 1e-4  # relative width of a bracket that has lost its root to another point's change
 _SINKING = 1e3  # times the compliance: how fast a sole's point may sink beside the others
 
@@ -59,6 +70,10 @@ class Equations(NamedTuple):
     slope: Array  # (3 P,) their derivative by a point's yielding
     low: Array  # (P,) bracket of each point's yielding
     high: Array  # (P,)
+    sliding: IntArray  # (P,) normal rows of the points that slide
+    rate: Array  # (P, P) what the yielding of each does to the cone of each
+    own: Array  # (P,) its diagonal
+    change: Array  # (P,) of their yielding
 
 
 def allocate_equations(nv: int, points: int, feet: int) -> Equations:
@@ -70,7 +85,8 @@ def allocate_equations(nv: int, points: int, feet: int) -> Equations:
         torque=np.zeros(feet), point=np.zeros(size, np.int64), axis=np.zeros(size, np.int64),
         G=np.zeros((size, size)), H=np.zeros((size, size)), factor=np.zeros((size, size)),
         right=np.zeros(size), f=np.zeros(size), slope=np.zeros(size), low=np.zeros(points),
-        high=np.zeros(points),
+        high=np.zeros(points), sliding=np.zeros(points, np.int64),
+        rate=np.zeros((points, points)), own=np.zeros(points), change=np.zeros(points),
     )  # fmt: skip
 
 
@@ -108,12 +124,13 @@ def _friction(eq, size, mu, yielding):
     """Solve (G + diag(yielding)) f = right with yielding >= 0 such that every cone holds.
 
     ``yielding`` (P,) is -w / f_t of a sliding point over T, 0 of a sticking one. Newton on
-    mu f_n / |f_t| = 1, which is nearly affine in it (as in trust regions).
+    mu f_n / |f_t| = 1, which is nearly affine in it (as in trust regions), for all points together,
+    then for each one within a bracket.
     """
     f = eq.f[:size]
     low, high = eq.low, eq.high
     low[:], high[:] = 0.0, np.inf
-    for _ in range(_ITERATIONS):
+    for turn in range(_ITERATIONS):
         for r in range(size):
             for k in range(size):
                 eq.H[r, k] = eq.G[r, k]
@@ -124,47 +141,107 @@ def _friction(eq, size, mu, yielding):
             return False
         forward_solve(eq.factor, f)
         backward_solve(eq.factor, f)
-        settled = True
+        settled, count = True, 0
         for r in range(2, size):
             i = eq.point[r]
             if eq.axis[r] != 2 or mu[i] == 0.0 or mu[i] == np.inf:
                 continue
             excess = math.hypot(f[r - 2], f[r - 1]) - mu[i] * f[r]
-            if abs(excess) <= _CONE * abs(mu[i] * f[r]) or (excess < 0.0 and yielding[i] == 0.0):
+            if excess > 0.0 or yielding[i] > 0.0:
+                eq.sliding[count] = r
+                count += 1
+                settled = settled and abs(excess) <= _CONE * abs(mu[i] * f[r])
+        if settled:
+            break
+        if turn < _TOGETHER and _move_together(eq, f, mu, yielding, eq.sliding[:count]):
+            continue
+        for k in range(count):
+            r = eq.sliding[k]
+            i = eq.point[r]
+            excess = math.hypot(f[r - 2], f[r - 1]) - mu[i] * f[r]
+            if abs(excess) <= _CONE * abs(mu[i] * f[r]):
                 continue
-            settled = False
             if excess > 0.0:
                 low[i] = yielding[i]
             else:
                 high[i] = yielding[i]
-            guess = _newton(eq, f, r, mu[i], yielding[i])
+            guess = np.inf
+            if _has_slope(f, r):
+                _yield_by(eq, f, r)
+                rate = _cone_rate(eq, f, r, mu[i])
+                if rate > 0.0:
+                    guess = yielding[i] + _cone_gap(f, r, mu[i]) / rate
             if low[i] == 0.0 and guess < 0.0:
                 guess = 0.0
             yielding[i] = _inside(guess, low[i], high[i], eq.G[r, r])
             if high[i] - low[i] <= _STALE * high[i]:  # moved by the other points: begin again
                 low[i], high[i] = 0.0, np.inf
-        if settled:
-            break
     return True
 
 
 @inner
-def _newton(eq, f, r, mu, yielding):
-    """Newton iterate for mu f_n / |f_t| = 1 of the point whose normal row is r; inf if none."""
-    tangent = math.hypot(f[r - 2], f[r - 1])
-    if f[r] <= 0.0 or tangent == 0.0:
-        return np.inf
+def _yield_by(eq, f, r):
+    """Write the derivative of all forces by the yielding of the point whose normal row is r."""
     slope = eq.slope[: f.size]
     slope[:] = 0.0
     slope[r - 2], slope[r - 1] = -f[r - 2], -f[r - 1]
     forward_solve(eq.factor, slope)
     backward_solve(eq.factor, slope)
+
+
+@inner
+def _has_slope(f, r):
+    """Whether mu f_n / |f_t| has a derivative: the point at normal row r pushes and drags."""
+    return f[r] > 0.0 and (f[r - 2] != 0.0 or f[r - 1] != 0.0)
+
+
+@inner
+def _cone_gap(f, r, mu):
+    """Return 1 - mu f_n / |f_t| of the point whose normal row is r."""
+    return 1.0 - mu * f[r] / math.hypot(f[r - 2], f[r - 1])
+
+
+@inner
+def _cone_rate(eq, f, r, mu):
+    """Return the derivative of mu f_n / |f_t| at normal row r, where forces change by ``slope``."""
+    slope, tangent = eq.slope, math.hypot(f[r - 2], f[r - 1])
     along = (f[r - 2] * slope[r - 2] + f[r - 1] * slope[r - 1]) / tangent
-    ratio = mu * f[r] / tangent
-    rate = (mu * slope[r] - ratio * along) / tangent
-    if rate <= 0.0:
-        return np.inf
-    return yielding + (1.0 - ratio) / rate
+    return (mu * slope[r] - mu * f[r] / tangent * along) / tangent
+
+
+@inner
+def _move_together(eq, f, mu, yielding, rows):
+    """Do a Newton step on the yielding of all sliding points; False if there is none to trust.
+
+    Args:
+        eq: the equations, factored.
+        f: forces of the closed points.
+        mu: (P,) friction.
+        yielding: (P,) moved, to 0 where a point would begin to stick.
+        rows: (k,) normal rows of the sliding points.
+    """
+    count = rows.size
+    for r in rows:
+        if not _has_slope(f, r):
+            return False
+    for j in range(count):
+        _yield_by(eq, f, rows[j])
+        for i in range(count):
+            eq.rate[i, j] = _cone_rate(eq, f, rows[i], mu[eq.point[rows[i]]])
+        eq.own[j] = eq.rate[j, j]
+        eq.change[j] = _cone_gap(f, rows[j], mu[eq.point[rows[j]]])
+        if not eq.own[j] > 0.0:
+            return False
+    if not eliminate(eq.rate[:count, :count], _PIVOT, eq.own[:count]):
+        return False
+    substitute(eq.rate[:count, :count], eq.change[:count])
+    for j in range(count):
+        if not abs(eq.change[j]) < np.inf:
+            return False
+    for j in range(count):
+        i = eq.point[rows[j]]
+        yielding[i] = max(0.0, yielding[i] + eq.change[j])
+    return True
 
 
 @inner

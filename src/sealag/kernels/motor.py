@@ -215,7 +215,7 @@ def link_work(link, step):
 def expand(motors, j, instant, drive, rotor, link, t, order, series):
     """Write the series of speed, spring and motor torque over a time t; return the rotor then."""
     angle = speed = torque = 0.0
-    for k in range(order + 1):
+    for k in range(_FORCED + 1):
         rate, spring, motor = rates(motors, j, instant, drive, rotor, link.angle, link.speed)
         series.speed[k], series.spring[k], series.torque[k] = rotor.speed, spring, motor
         angle += rotor.angle
@@ -225,6 +225,25 @@ def expand(motors, j, instant, drive, rotor, link, t, order, series):
         rotor = Rotor(by * rate.angle, by * rate.speed, by * rate.torque)
         link = Link(by * link.speed, by * link.bend, by * link.jerk, 0.0)
         drive = Drive(drive.limited, drive.locked, 0.0, 0.0)
+    # Nothing is left of link and command: what follows is the rotor's own, with the rates of a unit
+    # of its angle, speed and torque.
+    a, spring_a, motor_a = rates(motors, j, instant, drive, Rotor(1.0, 0.0, 0.0), 0.0, 0.0)
+    s, spring_s, motor_s = rates(motors, j, instant, drive, Rotor(0.0, 1.0, 0.0), 0.0, 0.0)
+    u, spring_u, motor_u = rates(motors, j, instant, drive, Rotor(0.0, 0.0, 1.0), 0.0, 0.0)
+    for k in range(_FORCED + 1, order + 1):
+        x, y, z = rotor
+        series.speed[k] = y
+        series.spring[k] = spring_a * x + spring_s * y + spring_u * z
+        series.torque[k] = motor_a * x + motor_s * y + motor_u * z
+        angle += x
+        speed += y
+        torque += z
+        by = t / (k + 1.0)
+        rotor = Rotor(
+            by * (a.angle * x + s.angle * y + u.angle * z),
+            by * (a.speed * x + s.speed * y + u.speed * z),
+            by * (a.torque * x + s.torque * y + u.torque * z),
+        )
     return Rotor(angle, speed, torque)
 
 

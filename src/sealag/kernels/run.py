@@ -232,6 +232,51 @@ def _keeps_contacts(physics):
     return smallest >= -MARGIN
 
 
+class Undelayed(NamedTuple):
+    """∫τ_now dθ of a command that is known at instants, the newest last."""
+
+    theta: Array  # (3, n) motor angles, rad
+    command: Array  # (3, n) τ_now, Nm
+    work: Array  # (n,) J
+    rough: Array  # (1,) J
+    before: Array  # (1,) work of the last interval, J
+    instants: IntArray  # (1,) how many there were
+
+
+def allocate_undelayed(n: int) -> Undelayed:
+    """Return the work of n joints before the first instant."""
+    return Undelayed(
+        theta=np.zeros((3, n)), command=np.zeros((3, n)), work=np.zeros(n), rough=np.zeros(1),
+        before=np.zeros(1), instants=np.zeros(1, np.int64),
+    )  # fmt: skip
+
+
+@entry
+def carry_work(kept, theta):
+    """Carry `Undelayed` on to motor angles (n,), at which the newest command holds: trapezoids."""
+    _carry_work(kept.parts, theta)
+
+
+@inner
+def _carry_work(done, theta):
+    count, now, wide = done.instants[0], 0.0, 0.0
+    for j in range(theta.size):
+        done.theta[2, j], force = theta[j], done.command[2, j]
+        if count > 0:
+            part = 0.5 * (done.command[1, j] + force) * (theta[j] - done.theta[1, j])
+            done.work[j] += part
+            now += part
+        if count > 1:
+            wide += 0.5 * (done.command[0, j] + force) * (theta[j] - done.theta[0, j])
+    if count > 1:
+        done.rough[0] += 0.5 * abs(wide - done.before[0] - now)
+    for k in range(2):
+        copy(done.theta[k + 1], done.theta[k])
+        copy(done.command[k + 1], done.command[k])
+    done.before[0] = now
+    done.instants[0] = count + 1
+
+
 class Course(NamedTuple):
     """What a run does with a plant, and its log."""
 

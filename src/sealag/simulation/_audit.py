@@ -20,11 +20,12 @@ potential that is quadratic in θ, and otherwise known to the bound that is stat
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from sealag.kernels import keep
 from sealag.kernels.ledger import DISTURBANCE, JOINT_FLOWS, MOTOR_STORE, SCALAR_FLOWS, STORES
 from sealag.simulation._ledger import residual
 from sealag.store import Store, blocks, release
@@ -152,45 +153,34 @@ class Stated:
     rough: float
 
 
-@dataclass(slots=True)
 class UndelayedWork:
     """∫τ_now dθ of a command that is known at instants: the trapezoid in θ.
 
-    Attributes:
+    Args:
         n: Number of joints.
+
+    Attributes:
         command: τ_now of the present instant (n,), Nm; written by the controller.
         work: ∫τ_now dθ per joint (n,), J.
-        rough: Bound of the error of its sum, J: half of what the trapezoids over every two
-            neighbouring intervals differ from those over one, three times their error where the
-            motion is smooth.
     """
 
-    n: int
-    command: Array = field(init=False)
-    work: Array = field(init=False)
-    rough: float = field(init=False, default=0.0)
-    _last: list[tuple[Array, Array]] = field(init=False, default_factory=list)
-    _done: float = field(init=False, default=0.0)
+    def __init__(self, n: int) -> None:
+        from sealag.kernels import run
 
-    def __post_init__(self) -> None:
-        self.command, self.work = np.zeros(self.n), np.zeros(self.n)
+        parts = run.allocate_undelayed(n)
+        self._rough, self._kept, self._carry = parts.rough, keep(parts), run.carry_work
+        self.command, self.work = parts.command[2], parts.work
+
+    @property
+    def rough(self) -> float:
+        """Bound of the error of the sum of the works, J: half of what the trapezoids over every two
+        neighbouring intervals differ from those over one, three times their error where the motion
+        is smooth."""
+        return float(self._rough[0])
 
     def move(self, theta: Array) -> None:
         """Take the motor angles (n,) at which ``command`` holds."""
-        here, before = (theta.copy(), self.command.copy()), self._done
-        if self._last:
-            mean, way = _trapezoid(self._last[-1], here)
-            self._done = float(mean.dot(way))
-            self.work += np.multiply(mean, way, out=mean)
-        if len(self._last) == 2:
-            mean, way = _trapezoid(self._last[0], here)
-            self.rough += 0.5 * abs(float(mean.dot(way)) - before - self._done)
-        self._last = [*self._last[-1:], here]
-
-
-def _trapezoid(start: tuple[Array, Array], end: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Mean command and way (n,) of an interval; their products are the works."""
-    return 0.5 * (start[1] + end[1]), end[0] - start[0]
+        self._carry(self._kept, theta)
 
 
 class Books(NamedTuple):

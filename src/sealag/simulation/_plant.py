@@ -301,30 +301,32 @@ class Plant:
     def _locate(
         self, step: float, f_high: float, point: int, *, sliding: Array
     ) -> tuple[float, int]:
-        """Shorten the step to where the first margin vanishes (Illinois); return length, point."""
-        low, high, middle = 0.0, step, step
-        tolerance = self._kernel.MARGIN
-        f_low = max(self.surroundings.margin(self.now)[0], tolerance)
-        side = 0
+        """Shorten the step to where the first margin vanishes (Chandrupatla); return length, point.
+
+        The margin is the smallest of several, so that its ends may belong to different points: a
+        secant is trusted only where three values agree about it, else the bracket is halved.
+        """
+        tolerance, finest = self._kernel.MARGIN, 1e-9 * self.step_length
+        a, f_a, b = step, f_high, 0.0  # the last length, and the other end of the bracket
+        f_b = max(self.surroundings.margin(self.now)[0], tolerance)
+        share = f_a / (f_a - f_b) if math.isfinite(f_b) else 0.5  # the gap widens there: halve
         for _ in range(_LOCATE):
-            middle = 0.5 * (low + high)
-            if math.isfinite(f_low):  # else the gap widens there: halve
-                middle = (low * f_high - high * f_low) / (f_high - f_low)
             self.contacts.yielding[:] = sliding
+            middle = a + share * (b - a)
             self._try(middle)
             value, at = self.surroundings.margin(self._next)
             point = at if value < tolerance else point
-            if abs(value) <= tolerance or high - low <= 1e-9 * self.step_length:
-                break
-            if value < 0:
-                high, f_high = middle, value
-                f_low = 0.5 * f_low if side == -1 else f_low
-                side = -1
+            if (value < 0) == (f_a < 0):
+                c, f_c = a, f_a
             else:
-                low, f_low = middle, value
-                f_high = 0.5 * f_high if side == 1 else f_high
-                side = 1
-        return middle, point
+                c, f_c, b, f_b = b, f_b, a, f_a
+            a, f_a = middle, value
+            if abs(value) <= tolerance or abs(b - a) <= finest:
+                break
+            share = _share(a, b, c, f_a=f_a, f_b=f_b, f_c=f_c)
+            edge = 0.5 * finest / abs(b - a)
+            share = min(max(share, edge), 1.0 - edge)
+        return a, point
 
     def _change(self, point: int) -> None:
         """Let a contact point change at the present instant, where its margin has vanished."""
@@ -386,3 +388,15 @@ class Plant:
                     impulse=(x, y, z),
                 )
             )
+
+
+def _share(a: float, b: float, c: float, *, f_a: float, f_b: float, f_c: float) -> float:
+    """Return how far from a towards b the root is, by the inverse parabola through three values;
+    one half where they are not monotone enough for it."""
+    if not (math.isfinite(f_a + f_b + f_c) and f_b != f_c):
+        return 0.5
+    place, height = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b)
+    if not (height**2 < place and (1.0 - height) ** 2 < 1.0 - place):
+        return 0.5
+    near = f_a / (f_b - f_a) * f_c / (f_b - f_c)
+    return near + (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)

@@ -117,7 +117,8 @@ class Estimator:
             feet: Their positions (2, 3), m.
             stance: Foot stood on.
         """
-        self._biped.anchor[:], self._stance = feet, stance
+        # A plain integer: kernels take ten times as long to recognise an enumeration.
+        self._biped.anchor[:], self._stance = feet, int(stance)
         self._biped.flight.arrival[:], self._newest, self._any = -np.inf, 0, False
 
     def sent(self, command: Array, arrival: float) -> None:
