@@ -22,6 +22,7 @@ from sealag.design._criteria import (
 )
 from sealag.design._design import Design
 from sealag.design._local import MOST_EXACT, Local, local_of
+from sealag.design._proven import stated_jitter
 from sealag.errors import InputError
 from sealag.passivity import (
     Answer,
@@ -273,7 +274,7 @@ def _answer(case: Findings) -> Answer:
         left_open=_left_open(case),
         stable=local.stable,
         unstable_modes=local.unstable_modes,
-        jitter_margin_s=_jitter_margin(case),
+        jitter_margin_s=stated_jitter(case.loop, float(local.delay[local.critical])),
         local_margin_s=local.margin_s,
         critical=Critical(instant=local.critical, time_s=float(case.motion.time[local.critical])),
         first_crossing_s=local.first_crossing_s,
@@ -352,18 +353,6 @@ def _finite(value: float) -> float | None:
 def _conservatism(margin: float | None, bound: float) -> float | None:
     known = margin is not None and 0.0 < margin < np.inf and 0.0 < bound < np.inf
     return margin / bound if margin is not None and known else None
-
-
-def _jitter_margin(case: Findings) -> float | None:
-    """Of the critical instant's loop: what is proven, 0 where it is unstable without delay."""
-    local, loop = case.local, case.loop
-    here = local.delay[local.critical]
-    if here == 0.0:
-        return 0.0
-    if loop is not None and loop.jitter is not None:
-        return loop.jitter.delay_s
-    free = loop is not None and not loop.A_1.any()
-    return np.inf if free and np.isinf(here) else None
 
 
 def _left_open(case: Findings) -> dict[str, str]:

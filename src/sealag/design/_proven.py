@@ -1,5 +1,7 @@
 """The proof of a frozen loop's jitter margin that a certificate holds."""
 
+import math
+
 from sealag.errors import SolverError
 from sealag.margin import DelayedLoop
 from sealag.passivity import LocalLoop
@@ -31,3 +33,18 @@ def proven_jitter(stated: LocalLoop, loop: FrozenLoop) -> LocalLoop:
     if found is None:
         return stated
     return stated.proven(found.delay, P=found.P, X=found.X, X_e=found.X_e) or stated
+
+
+def stated_jitter(loop: LocalLoop | None, margin: float) -> float | None:
+    """Return the jitter margin that a certificate states, s; None if none is proven.
+
+    Args:
+        loop: the frozen loop of the critical instant, with its proof; None if there is no loop.
+        margin: the exact margin there, s; 0 where it is unstable without delay, NaN if open.
+    """
+    if margin == 0.0:
+        return 0.0
+    if loop is not None and loop.jitter is not None:
+        return loop.jitter.delay_s
+    free = loop is not None and not loop.A_1.any()
+    return math.inf if free and margin == math.inf else None
