@@ -19,6 +19,7 @@ from sealag.tune._optimal import optimal
 from sealag.tune._passive import EASE, Knobs, damped
 from sealag.tune._question import LARGEST_SAFETY, Aim, Limit, Number, Question, Share
 from sealag.tune._room import closed_text, least_of, room_of
+from sealag.tune._schedule import scheduled
 from sealag.tune._search import first_crossing
 from sealag.tune._shaping import least_shaping
 from sealag.typing import Array
@@ -110,6 +111,8 @@ def tune(
         return optimal(question)
     if question.aim is Aim.FRONT:
         return front_of(question)
+    if question.aim is Aim.SCHEDULE:
+        return scheduled(question)
     if question.aim is not Aim.STIFFNESS:
         return _least_damping(question)
     if question.number is Number.PASSIVE:
