@@ -176,6 +176,8 @@ def _show(tuned: Any, path: Path | None, *, good: bool) -> None:
         rows += [(name, _gain(value)) for name, value in tuned.gains().items()]
     if good:
         rows.append(("promised", _PROMISES[question.number]))
+        if tuned.schedule is not None:
+            rows.append(("", "while the gains do not grow: growing, they add energy (docs, 16.9)"))
         rows += _transparency(tuned)
     if tuned.certificate is not None:
         status = tuned.certificate.answer.status.value.replace("_", " ")
