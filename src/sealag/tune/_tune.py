@@ -61,7 +61,9 @@ def tune(
         motion: its instants; the posture if None.
         aim: stiffness, the largest K_x or K_p; bandwidth, the largest ω of joint PD, or what a
             given one tolerates; damping, the least trace D_θ; drag, the least energy that D_θ takes
-            along the motion; shaping, the least β that loop rate and torque noise allow.
+            along the motion; shaping, the least β that loop rate and torque noise allow; mapping,
+            the controller's damping in the drives; optimal, the least quadratic index; front,
+            designs that no other one beats; schedule, the largest K_x at each instant of a motion.
         number: the delay that must reach the required one: passive (closed form or a convex
             program, certified), jitter or constant (the first crossing from small gains up).
         share: what has a factor of its own: common (all tasks), task, or direction (of joint PD:
@@ -74,7 +76,8 @@ def tune(
         limits: of transparency, for stiffness, damping and drag: bandwidth, the least of the locked
             joints, Hz; rms, the largest of Γ_sea against its command along the motion, Nm. For the
             largest stiffness motor damping is set to the most that they leave. For shaping: noise,
-            the largest gain |B / B_s − 1| of torque noise.
+            the largest gain |B / B_s − 1| of torque noise. For optimal: error (m or rad) and torque
+            (Nm), which count alike. For schedule: rate, the largest of log K_x, 1/s.
 
     Returns:
         The gains, or why there are none; no gain is a result, not an error.
