@@ -800,8 +800,8 @@ MUTANTS = [
     ),
     *_of(
         "tune", "tune/_mapping.py",
-        ("seen = np.einsum(\"tik,tkl,til->i\", Pi, central, Pi)",
-         "seen = np.einsum(\"tii->i\", central)", "the plain diagonal under contacts"),
+        ("normal = np.sum(Pi**2, axis=0)", "normal = len(Pi) * np.eye(Pi.shape[-1])",
+         "the plain diagonal under contacts"),
         ("replace(task, damping=(1.0 - share) *", "replace(task, damping=1.0 *",
          "damping in the drives and in the controller"),
     ),
