@@ -65,7 +65,8 @@ def test_a_third_quantity_is_a_bar_of_greys(tmp_path):
         name="points", x=x, y=y, labels=("a", "b", "c"), shades=np.array([1.0, 2.0, 9.0])
     )
     path = tmp_path / "p.svg"
-    picture(curves=(points,), shade="bandwidth (Hz)", logarithmic=True).write(path)
+    shown = picture(curves=(points,), shade="bandwidth (Hz)", logarithmic=True, marks={}, levels={})
+    shown.write(path)
     text, (colours, _) = path.read_text(), strokes(path)
     assert "bandwidth (Hz)" in text
     assert ">b<" in text
