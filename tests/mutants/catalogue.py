@@ -465,7 +465,7 @@ MUTANTS = [
         ("if len(motion) > 1:", "if True:", "one instant is a posture"),
     ),
     *_of(
-        "design", "design/_certify.py",
+        "design", "design/_findings.py",
         ("if not reasons and (delay_s > largest or",
          "if not reasons and (delay_s > 2.0 * largest or",
          "a delay that is too long is certified"),

@@ -81,7 +81,9 @@ def sweep(
     ],
     ask: Annotated[
         str,
-        typer.Option("--ask", help="certify, margin, simulate, tune or tune:aim=…,number=…."),
+        typer.Option(
+            "--ask", help="certify, bound, margin, simulate, tune or tune:aim=…,number=…."
+        ),
     ] = "certify",
     motion: MotionFile = None,
     sample: Annotated[
