@@ -31,6 +31,7 @@ from humanoids2016._random_table import (
     random_plant_table,
 )
 from humanoids2016._study import planned_walk, reproduce, study
+from humanoids2016._tuned_walk import TunedWalk, tuned_claim, tuned_walk
 from humanoids2016._unsafe import UnsafeExample, delayed_margin, unsafe_examples
 from humanoids2016._walk import Walk, WalkCase, at_delay_scale, simulate_walk, walking_of
 from humanoids2016._walk_errors import NoisySensors, SensorNoise, wrong_robot, wrong_springs
@@ -64,6 +65,7 @@ __all__ = [
     "SplitDamping",
     "StudySize",
     "TorqueTrace",
+    "TunedWalk",
     "UnsafeExample",
     "Verdict",
     "Walk",
@@ -98,6 +100,8 @@ __all__ = [
     "split_claim",
     "split_damping",
     "study",
+    "tuned_claim",
+    "tuned_walk",
     "unsafe_examples",
     "walk_claim",
     "walk_success",

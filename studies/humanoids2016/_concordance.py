@@ -76,8 +76,8 @@ ROWS = (
         "embedded_down in the project file; d_1 is what certificate and simulation take. A "
         "constant delay acts alike on both ways; a varying one need not."),
     Row("Future work (iii)", "Optimal central controller; central against embedded damping.",
-        "Claim “central damping”: what it costs to compute damping centrally. An optimal "
-        "controller is not designed here."),
+        "Claims “central damping”: what it costs to compute damping centrally, and “tuned "
+        "gains”. `sealag tune` has --aim mapping and --aim optimal."),
     Row("Future work (iv)", "Experiments; Coulomb friction, torque bandwidth.", "Walks with both, "
         "section “Beyond the paper”. No experiment on hardware."),
 )  # fmt: skip

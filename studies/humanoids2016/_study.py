@@ -21,6 +21,7 @@ from humanoids2016._levels import level_claim, level_table
 from humanoids2016._live import live_leg
 from humanoids2016._paper_page import write_paper_page
 from humanoids2016._random_table import random_plant_table
+from humanoids2016._tuned_walk import tuned_claim, tuned_walk
 from humanoids2016._unsafe import unsafe_examples
 from humanoids2016._walk import WalkCase, simulate_walk, walking_of
 from humanoids2016._walk_table import (
@@ -178,6 +179,7 @@ def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> 
             *figure_5_claims(traces),
             level_claim(levels),
             split_claim(damping),
+            tuned_claim(tuned_walk(system, walk), system.robot.joints),
             walk_claim(robust, published),
         ),
     )

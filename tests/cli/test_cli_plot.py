@@ -117,3 +117,21 @@ def test_a_mapping_in_words_and_in_the_file(cli, tmp_path):
     assert "jitter margin, central   1.030 ms" in said
     assert 'damping_at = "drive"            # or' in project.read_text()
     assert cli("certify", project, "--out", tmp_path / "c.json")[0] == 0
+
+
+def test_a_schedule_is_written_beside_its_project_and_certified(recording, cli, tmp_path):
+    project, picture = tmp_path / "go2.toml", tmp_path / "s.svg"
+    project.write_text(GO2.read_text())
+    code, said, _ = cli(
+        "tune", project, "--aim", "schedule", "--limit", "rate=2", "--motion", recording[0],
+        "--write", project, "--plot", picture,
+    )  # fmt: skip
+    assert code == 0
+    assert "factor along the motion    3.75" in said
+    assert "factor of all stiffness (1)" in picture.read_text()
+    assert 'file = "go2.schedule.csv"' in project.read_text()
+    code, text, _ = cli(
+        "certify", project, "--time-varying", "--json", "--out", tmp_path / "c.json"
+    )
+    assert code == 0
+    assert json.loads(text)["time_varying_delay_s"] >= 0.007

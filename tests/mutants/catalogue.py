@@ -66,6 +66,7 @@ TESTS = {
     "tune": "tests/unit/test_tune_limits.py tests/unit/test_tune_margins.py "
             "tests/unit/test_tune_motion.py tests/unit/test_tune_optimal.py "
             "tests/unit/test_tune_front.py tests/unit/test_tune_mapping.py "
+            "tests/unit/test_tune_schedule.py tests/unit/test_tune_classical.py "
             "tests/unit/test_picture.py tests/cli/test_cli_tune.py",
     "units": "tests/unit/test_units.py tests/unit/test_design_starter.py",
 }  # fmt: skip
@@ -811,8 +812,8 @@ MUTANTS = [
     ),
     *_of(
         "tune", "tune/_mapping.py",
-        ("seen = np.einsum(\"tik,tkl,til->i\", Pi, central, Pi)",
-         "seen = np.einsum(\"tii->i\", central)", "the plain diagonal under contacts"),
+        ("normal = np.sum(Pi**2, axis=0)", "normal = len(Pi) * np.eye(Pi.shape[-1])",
+         "the plain diagonal under contacts"),
         ("replace(task, damping=(1.0 - share) *", "replace(task, damping=1.0 *",
          "damping in the drives and in the controller"),
     ),
@@ -833,6 +834,23 @@ MUTANTS = [
         ("point = _point(limited, design, room, float(delay), scale)",
          "point = _point(limited, design, room, 0.9 * float(delay), scale)",
          "damping for less than the delay of the curve"),
+    ),
+    *_of(
+        "tune", "tune/_schedule.py",
+        ("steady[k] = min(steady[k], steady[k - 1] + steps[k - 1])", "pass",
+         "gains that rise faster than the rate"),
+        ("reached = min(answer.max_delay_s, answer.time_varying_delay_s or 0.0)",
+         "reached = answer.max_delay_s", "a schedule certified at its instants only"),
+    ),
+    *_of(
+        "tune", "whole_body/_spaces.py",
+        ("S *= motion.stiffness[:, None, None]", "S *= motion.stiffness.mean()",
+         "one mean factor for all instants of a schedule"),
+    ),
+    *_of(
+        "tune", "design/_design.py",
+        ("factor = float(motion.stiffness[instant])", "factor = 1.0",
+         "margins of a schedule with the gains of the project"),
     ),
     *_of(
         "tune", "picture.py",

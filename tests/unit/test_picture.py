@@ -60,16 +60,17 @@ def test_curves_differ_without_colour(tmp_path):
 
 
 def test_a_third_quantity_is_a_bar_of_greys(tmp_path):
-    x = np.array([1.0, 10.0, 15.0])
+    x, y = np.array([30.0, 100.0, 150.0]), np.array([1.0, 2.0, 3.0])
     points = Curve(
-        name="points", x=x, y=x, labels=("a", "b", "c"), shades=np.array([1.0, 2.0, 9.0])
+        name="points", x=x, y=y, labels=("a", "b", "c"), shades=np.array([1.0, 2.0, 9.0])
     )
     path = tmp_path / "p.svg"
-    picture(curves=(points,), shade="bandwidth (Hz)", logarithmic=True).write(path)
+    shown = picture(curves=(points,), shade="bandwidth (Hz)", logarithmic=True, marks={}, levels={})
+    shown.write(path)
     text, (colours, _) = path.read_text(), strokes(path)
     assert "bandwidth (Hz)" in text
     assert ">b<" in text
-    assert ">10<" in text
+    assert all(f">{tick}<" in text for tick in (40, 100))  # plain numbers, between decades too
     assert all(one[1:3] == one[3:5] == one[5:7] for one in colours)
     assert {"#000000", "#ffffff"} <= colours
 

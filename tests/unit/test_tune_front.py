@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sealag
+from helpers.designs import EXAMPLES
 from helpers.small_systems import arm, arm_system, joint_task
 from sealag.errors import InputError
 from sealag.passivity import Status
@@ -104,3 +105,20 @@ def test_a_limit_of_the_bandwidth_is_the_least_of_the_points(system, front):
 def test_a_point_that_is_none(front):
     with pytest.raises(InputError, match="The front has no point 0; it has 1"):
         front.pick(0)
+
+
+def test_what_the_motors_own_damping_gives_for_nothing_is_taken(tmp_path):
+    """Below their own damping stiffness and delay cost nothing: softer gains are beaten there."""
+    text = (EXAMPLES / "go2.toml").read_text()
+    project = tmp_path / "go2.toml"
+    project.write_text(text.replace("motor_damping = 0.05 ", "motor_damping = 5.0 "))
+    system = sealag.load(project)
+    points = tune(system, aim="front").front
+    floor = 12 * 5.0
+    cheapest = [point for point in points if point.cost < floor * (1.0 + 1e-6)]
+    best = {point.delay_s: point.scale for point in cheapest}
+    assert 1 <= len(cheapest) == len(best)
+    for one in points:
+        for other in points:
+            if one is not other:
+                assert (goods(one) < goods(other)).any()

@@ -20,7 +20,8 @@ def tune(
             "(rad/s), also with ,damping-ratio=0.7; damping: the least of the motors; drag: the "
             "least along the motion; shaping: the least beta for the embedded period; mapping: "
             "the controller's damping moved into the drives; optimal: the stiffness with the least "
-            "quadratic index; front: designs that no other one beats.",
+            "quadratic index; front: designs that no other one beats; schedule: the largest "
+            "stiffness at each instant of a motion.",
         ),
     ] = "stiffness",
     limit: Annotated[
@@ -30,7 +31,7 @@ def tune(
             help="Transparency to keep: bandwidth=8Hz, the least of the locked joints; rms=5Nm, "
             "the largest of torque against command along the motion; noise=10, the "
             "largest gain of torque noise by shaping; error=0.02 and torque=30Nm, which count "
-            "alike in the quadratic index. May be repeated.",
+            "alike in the quadratic index; rate=2, in 1/s, of a schedule. May be repeated.",
         ),
     ] = None,
     number: Annotated[

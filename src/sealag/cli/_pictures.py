@@ -151,6 +151,8 @@ def of_gains(tuned: Any) -> Picture:
     """
     if tuned.front:
         return _of_front(tuned)
+    if tuned.schedule is not None:
+        return _of_schedule(tuned)
     asked = tuned.question
     return Picture(
         title=f"{tuned.system.name}: delay that gains tolerate ({asked.aim}, {asked.number})",
@@ -160,6 +162,17 @@ def of_gains(tuned: Any) -> Picture:
         levels={"required": asked.required * 1e3},
         marks={"found": 1.0},
         logarithmic=True,
+    )
+
+
+def _of_schedule(tuned: Any) -> Picture:
+    """The factor of the gains along the motion."""
+    motion = tuned.schedule
+    return Picture(
+        title=f"{tuned.system.name}: scheduled stiffness",
+        x="time (s)",
+        y="factor of all stiffness (1)",
+        curves=(Curve(name="", x=motion.time, y=motion.stiffness),),
     )
 
 

@@ -23,7 +23,7 @@ _PROMISES = {
 """What holds for gains that reach the required delay by a number."""
 _GOALS = {"bandwidth": "bandwidth", "damping-ratio": "damping_ratio"}
 """Names in --aim, and what `tune` calls them."""
-_UNITS = {"bandwidth": "Hz", "rms": "Nm", "noise": "", "error": "", "torque": "Nm"}
+_UNITS = {"bandwidth": "Hz", "rms": "Nm", "noise": "", "error": "", "torque": "Nm", "rate": ""}
 """Unit of each limit."""
 
 
@@ -73,6 +73,8 @@ def tune_project(
     delay = None if delay_ms is None else seconds_from_ms(delay_ms)
     if write is not None:
         _check_target(write, system, motion, delay)
+    if write is not None and word == "schedule":
+        check_output(write.with_suffix(".schedule.csv"), *system.files, *filter(None, [motion]))
     check_picture(plot, *system.files, *([motion] if motion else []))
     along = system.motion_of(motion)
     compile_kernels()
@@ -85,7 +87,11 @@ def tune_project(
         if plot is not None:
             of_gains(tuned).write(plot)
     written = write if good else None
-    if written is not None:
+    if written is not None and tuned.schedule is not None:
+        beside = written.with_suffix(".schedule.csv")
+        system.save_motion(tuned.schedule, beside)
+        write_text(written, tuned.text_with(beside.name))
+    elif written is not None:
         write_text(written, tuned.system.text)
     if outputs["as_json"]:
         names = {"written": None if written is None else str(written)}
@@ -108,7 +114,7 @@ def _aim(aim: str) -> tuple[str, dict[str, float]]:
     if word != "bandwidth" or not set(goals) <= set(_GOALS.values()) or None in goals.values():
         raise InputError(
             f"--aim is {aim!r}; it must be one of stiffness, damping, drag, shaping, mapping, "
-            "optimal, front, bandwidth or "
+            "optimal, front, schedule, bandwidth or "
             "bandwidth=NUMBER "
             "(rad/s); damping-ratio=NUMBER may follow bandwidth behind a comma."
         )
@@ -122,7 +128,7 @@ def _limit(text: str) -> tuple[str, float]:
     if name not in _UNITS or value is None:
         raise InputError(
             f"--limit is {text!r}; it must be bandwidth=NUMBER (Hz), rms=NUMBER (Nm), "
-            "noise=NUMBER, error=NUMBER (m or rad) or torque=NUMBER (Nm)."
+            "noise=NUMBER, error=NUMBER (m or rad), torque=NUMBER (Nm) or rate=NUMBER (1/s)."
         )
     return name, value
 
@@ -170,6 +176,8 @@ def _show(tuned: Any, path: Path | None, *, good: bool) -> None:
         rows += [(name, _gain(value)) for name, value in tuned.gains().items()]
     if good:
         rows.append(("promised", _PROMISES[question.number]))
+        if tuned.schedule is not None:
+            rows.append(("", "while the gains do not grow: growing, they add energy (docs, 16.9)"))
         rows += _transparency(tuned)
     if tuned.certificate is not None:
         status = tuned.certificate.answer.status.value.replace("_", " ")
@@ -201,6 +209,9 @@ def _show(tuned: Any, path: Path | None, *, good: bool) -> None:
 def _findings(tuned: Any) -> list[tuple[str, str]]:
     """What a mapping of damping leaves, and what a quadratic index could be."""
     rows, mapping, index = [], tuned.mapping, tuned.index
+    if tuned.schedule is not None:
+        factors = tuned.schedule.stiffness
+        rows.append(("factor along the motion", f"{factors.min():.6g} to {factors.max():.6g}"))
     if mapping is not None:
         error = f"{mapping.error:.2%} of the controller's damping, at most {mapping.worst:.2%}"
         rows.append(("left over", f"{error} at instant {mapping.instant}"))

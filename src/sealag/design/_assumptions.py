@@ -45,6 +45,16 @@ def _of_the_proof(
             "The motion is checked at its instants, not between them; each instant is a "
             "configuration that is held.",
         )
+    if motion.stiffness is not None:
+        rate = np.diff(np.log(motion.stiffness)) / np.diff(motion.time)
+        yield (
+            "schedule",
+            f"The gains follow the motion's stiffness_factor, {motion.stiffness.min():.4g} to "
+            f"{motion.stiffness.max():.4g}, at its time. While they grow, by up to "
+            f"{max(float(rate.max(initial=0.0)), 0.0):.3g} of themselves a second, they put up to "
+            "that share of the tasks' potential into the loop each second, which no bound counts; "
+            "`sealag simulate` runs the gains of the project.",
+        )
     if criterion is Criterion.PUBLISHED:
         yield (
             "published_criterion",

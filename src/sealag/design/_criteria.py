@@ -87,7 +87,8 @@ def bounds_along(
     """
     system, count, printed = along.system, len(along.motion), kind is Criterion.PUBLISHED
     conditions, whole = Conditions.room(system, count), Bound.by_parts(count)
-    published = published or printed
+    # (29) and (31) are of gains that stay.
+    published = printed or (published and along.motion.stiffness is None)
     least, asymmetry = np.inf if published else np.nan, 0.0
     for rows, spaces in along.parts():
         told = _told(spaces, system, kind, solver) if published else None

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -184,7 +184,8 @@ class Design:
         if self.program is not None:
             return self._frozen_program().rest
         q, contacts = self._held(motion, instant)
-        return Rest.of(self.robot, self.law, self.actuators, q, contacts=contacts)
+        law = self._law_at(motion, instant)
+        return Rest.of(self.robot, law, self.actuators, q, contacts=contacts)
 
     def in_posture(self, motion: Motion | None = None, instant: int = 0) -> Rest:
         """Return the loop's state in an instant's configuration: tasks without error, springs
@@ -195,7 +196,8 @@ class Design:
             instant: which one.
         """
         q, contacts = self._held(motion, instant)
-        return Rest.in_posture(self.robot, self.law, self.actuators, q, contacts=contacts)
+        law = self._law_at(motion, instant)
+        return Rest.in_posture(self.robot, law, self.actuators, q, contacts=contacts)
 
     def frozen(
         self,
@@ -224,7 +226,7 @@ class Design:
         q, contacts = self._held(motion, instant)
         return FrozenLoop.of(
             self.robot,
-            self.law,
+            self._law_at(motion, instant),
             self.actuators,
             q,
             contacts=contacts,
@@ -302,6 +304,16 @@ class Design:
         if motion is None:
             return self.posture, self.contacts
         return motion.q[instant], motion.contact_sets[motion.contact_index[instant]]
+
+    def _law_at(self, motion: Motion | None, instant: int) -> Law:
+        """The law with the gains of an instant."""
+        if motion is None or motion.stiffness is None:
+            return self.law
+        factor = float(motion.stiffness[instant])
+        tasks = (
+            replace(one, stiffness=factor * np.asarray(one.stiffness)) for one in self.law.tasks
+        )
+        return replace(self.law, tasks=tuple(tasks))
 
     def _frozen_program(self, period: float | None = None):
         """The program's controller about the posture, frozen as it ticks, at another period (s) if

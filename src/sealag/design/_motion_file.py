@@ -9,7 +9,13 @@ import numpy as np
 from sealag.design._base_pose import check_order, in_order, pose_from_contacts, question
 from sealag.design._design import Design
 from sealag.design._motion_names import TIME, Names, mapping_of
-from sealag.design._motion_table import CONTACT, RECORDING, read_table, recorded_columns
+from sealag.design._motion_table import (
+    CONTACT,
+    RECORDING,
+    STIFFNESS,
+    read_table,
+    recorded_columns,
+)
 from sealag.errors import InputError, MotionError, SealagError
 from sealag.files import written_whole
 from sealag.robot import Contact, Motion, Robot
@@ -20,6 +26,8 @@ if TYPE_CHECKING:
     from sealag.simulation import Run
 
 _LATEST = 1e12  # s
+_FACTORS = (1e-6, 1e6)
+"""Of the gains."""
 _SHORTEST = 1e-9  # s between two rows, that velocities stay numbers
 
 
@@ -158,6 +166,7 @@ def _motion(
         v=_velocities(table, robot, q, path=path, store=store, tell=tell),
         contact_sets=sets,
         contact_index=index,
+        stiffness=table.get(STIFFNESS),
     )
     release(motion.q, motion.v)
     return motion
@@ -180,6 +189,9 @@ def _check_rows(table: dict[str, Array], path: Path) -> None:
                 need = f"a number within ± {_LATEST:g} s"
         elif name.startswith(CONTACT):
             bad, need = (column != 0.0) & (column != 1.0), "0 or 1"
+        elif name == STIFFNESS:
+            low, high = _FACTORS
+            bad, need = ~((column >= low) & (column <= high)), f"a factor in {low:g} … {high:g}"
         if bad.any():
             row = int(bad.argmax())
             raise MotionError(
@@ -281,6 +293,8 @@ def motion_table(motion: Motion, robot: Robot) -> dict[str, Array]:
     for frame in sorted(frames):
         held = np.array([any(c.frame == frame for c in s) for s in motion.contact_sets])
         table[CONTACT + frame] = held[motion.contact_index].astype(float)
+    if motion.stiffness is not None:
+        table[STIFFNESS] = motion.stiffness
     return table
 
 

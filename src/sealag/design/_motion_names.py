@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sealag.design._motion_table import CONTACT, VELOCITY
+from sealag.design._motion_table import CONTACT, STIFFNESS, VELOCITY
 from sealag.errors import InputError, MotionError
 from sealag.files import read_whole
 from sealag.robot import Contact, Motion, Robot
@@ -139,7 +139,7 @@ class Names:
         absent = [name for name in self.mapping if name not in names]
         if absent:
             raise self._wrong(f"has no column {absent[0]!r}, which columns maps", absent[0], names)
-        known = {*self.positions, *self.velocities}
+        known = {*self.positions, *self.velocities, STIFFNESS}
         known |= {CONTACT + contact.frame for contact in self.contacts}
         found: dict[str, str] = {}
         times: list[str] = []
@@ -214,7 +214,8 @@ class Names:
         return MotionError(
             f"{self.path} {problem}{hint}. A motion has {TIME} (or time_ms, time_us, time_ns), "
             f"{base if self.base else ''}{', '.join(self.robot.joints)}; it may have {rates}"
-            f"{', ' if contacts else ''}{contacts}. --columns theirs=ours maps other names."
+            f"{', ' if contacts else ''}{contacts}, {STIFFNESS}. --columns theirs=ours maps other "
+            "names."
         ).at(self.path, name)
 
     def seconds(self, name: str, values: Array) -> Array:

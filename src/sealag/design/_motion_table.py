@@ -18,6 +18,7 @@ from sealag.units import number_of
 
 CONTACT = "contact:"
 VELOCITY = ":velocity"
+STIFFNESS = "stiffness_factor"
 RECORDING = ".mcap"
 LARGEST_BYTES = 2_000_000_000
 _CSV_BLOCK = 10_000  # rows that are lists of Python numbers at a time

@@ -279,6 +279,11 @@ class System(Design):
         name = self.criterion if criterion is None else criterion
         if name not in set(Criterion):
             raise InputError(f"criterion is {name!r}; it must be {either(list(Criterion))}.")
+        if name == Criterion.PUBLISHED and motion.stiffness is not None:
+            raise InputError(
+                "The motion has a stiffness_factor, and the published criterion is of gains that "
+                "stay; certify by the certified one, or leave the column out."
+            )
         if time_varying and (name == Criterion.PUBLISHED or len(motion) < 2):
             raise InputError(
                 "A time-varying bound needs the certified criterion and a motion of more than one "

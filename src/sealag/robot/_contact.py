@@ -48,6 +48,7 @@ class Motion:
         v: (N, nv) tangent velocities.
         contact_sets: the different sets of contacts that occur.
         contact_index: (N,) which of the sets holds at each instant.
+        stiffness: (N,) factor of the law's gains at each instant, positive; None for 1.
     """
 
     time: Array
@@ -55,6 +56,7 @@ class Motion:
     v: Array
     contact_sets: tuple[tuple[Contact, ...], ...]
     contact_index: IntArray
+    stiffness: Array | None = None
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not fit each other.
@@ -74,6 +76,13 @@ class Motion:
             bad = ~np.isfinite(values).reshape(count, -1).all(axis=1)
             if bad.any():
                 raise MotionError(f"The motion's {name} is not finite at instant {bad.argmax()}.")
+        if self.stiffness is not None and (
+            len(self.stiffness) != count
+            or not (np.isfinite(self.stiffness) & (self.stiffness > 0.0)).all()
+        ):
+            raise MotionError(
+                f"The motion's stiffness must be {count} positive factors, one for each instant."
+            )
         if (np.diff(self.time) <= 0.0).any():
             at = int((np.diff(self.time) <= 0.0).argmax()) + 1
             raise MotionError(f"The motion's time does not increase at instant {at}.")
@@ -118,4 +127,5 @@ class Motion:
             v=self.v[instants],
             contact_sets=self.contact_sets,
             contact_index=self.contact_index[instants],
+            stiffness=None if self.stiffness is None else self.stiffness[instants],
         )

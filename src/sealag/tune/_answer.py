@@ -9,11 +9,12 @@ import numpy as np
 from sealag.design import System, certify
 from sealag.errors import ContractionError, InputError, SolverError
 from sealag.passivity import Certificate, Criterion, Status
+from sealag.robot import Motion
 from sealag.tune._curve import number_along
 from sealag.tune._findings import Index, Point, Replaced
 from sealag.tune._question import Aim, Number, Question, pd_keys
 from sealag.tune._room import transparency_of
-from sealag.tune._write import as_file, kd_of_file
+from sealag.tune._write import as_file, kd_of_file, with_motion
 from sealag.typing import Array
 from sealag.units import time_text
 
@@ -69,6 +70,7 @@ class Tuned:
         mapping: how well drives replace the controller's damping; None for other aims.
         index: the quadratic index; None for other aims.
         front: designs that no other one beats; empty for other aims.
+        schedule: the motion with the gains' factor at each instant; None for other aims.
     """
 
     question: Question
@@ -85,6 +87,7 @@ class Tuned:
     mapping: Replaced | None = None
     index: Index | None = None
     front: tuple[Point, ...] = ()
+    schedule: Motion | None = None
 
     @classmethod
     def none(cls, question: Question, *reasons: str) -> "Tuned":
@@ -189,6 +192,24 @@ class Tuned:
         """
         return number_along(self.question, self.system, shares)
 
+    def _factors(self) -> dict[str, list[float]] | None:
+        """The schedule by its columns."""
+        motion = self.schedule
+        if motion is None or motion.stiffness is None:
+            return None
+        return {"time_s": motion.time.tolist(), "factor": motion.stiffness.tolist()}
+
+    def text_with(self, motion: str) -> str:
+        """Return the text of the project file with these gains that names a motion.
+
+        Args:
+            motion: the motion's file, relative to the project's.
+
+        Raises:
+            InputError: the file's dotted keys leave no place for it.
+        """
+        return with_motion(self.system, motion)
+
     def gains(self) -> dict[str, Any]:
         """Return the design's gains by the names that its project file has for them."""
         law, joints = self.system.law, self.system.robot.joints
@@ -228,6 +249,7 @@ class Tuned:
             "mapping": None if self.mapping is None else self.mapping.summary(joints),
             "index": None if self.index is None else asdict(self.index),
             "front": [point.summary() for point in self.front],
+            "schedule": self._factors(),
             "certificate": None if certificate is None else certificate.summary(),
             "reasons": list(self.reasons),
         }

@@ -14,7 +14,7 @@ class Replaced:
 
     Attributes:
         damping: (n,) what the drives take over, Nms/rad.
-        error: ‖Πᵀ D Π − J*ᵀ D_x J*‖ over ‖J*ᵀ D_x J*‖ (Frobenius), both in root mean square over
+        error: ‖Π D Π − J*ᵀ D_x J*‖ over ‖J*ᵀ D_x J*‖ (Frobenius), both in root mean square over
             the motion.
         worst: the largest of one instant, over the same mean.
         instant: where.

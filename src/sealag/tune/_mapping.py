@@ -26,9 +26,9 @@ be replaced exactly; ten times less does so by rounding, where it alone decides.
 def mapped(question: Question) -> Tuned:
     """Return the design whose drives have the damping nearest to that of its controller.
 
-    min Σ_t ‖Π_tᵀ D Π_t − J*ᵀ D_x J*‖² over diagonal D ≥ 0, a non-negative least squares problem; Π
-    are the joint motions that the contacts leave, I for a fixed base, where D is the mean of the
-    diagonal.
+    min Σ_t ‖Π_t D Π_t − J*ᵀ D_x J*‖² over diagonal D ≥ 0, a non-negative least squares problem; Π
+    projects on the joint rates that the contacts leave: I for a fixed base, where D is the mean of
+    the diagonal.
 
     Args:
         question: whose design and motion.
@@ -37,7 +37,7 @@ def mapped(question: Question) -> Tuned:
     central, Pi = _central(system, motion), _consistent(system, motion)
     # Six digits: more are the rounding of joints that contacts move alike.
     fit = np.array([float(f"{value:.6g}") for value in _nearest(central, Pi)])
-    left = np.linalg.norm(Pi.transpose(0, 2, 1) @ (fit[:, None] * Pi) - central, axis=(1, 2))
+    left = np.linalg.norm(Pi @ (fit[:, None] * Pi) - central, axis=(1, 2))
     size = np.linalg.norm(central, axis=(1, 2))
     scale = float(np.sqrt(np.mean(size**2)))
     if not scale > 0.0:
@@ -66,7 +66,8 @@ def _central(system: System, motion: Motion | None) -> Array:
 
 
 def _consistent(system: System, motion: Motion | None) -> Array:
-    """Π (N, n, n): what the contacts leave of joint rates, J* of a task that holds all joints."""
+    """Π (N, n, n), J* of a task that holds all joints: with φ = UN_s M⁻¹ (UN_s)ᵀ it is φ φ⁺, the
+    orthogonal projector on the joint rates that the contacts leave."""
     joints = Task(name="joints", kind=TaskKind.POSTURE, stiffness=np.ones(system.robot.n))
     law = Law(
         tasks=(joints,),
@@ -77,12 +78,12 @@ def _consistent(system: System, motion: Motion | None) -> Array:
 
 
 def _nearest(central: Array, Pi: Array) -> Array:
-    """D ≥ 0 (n,) with the least Σ ‖Σ_i D_i π_i π_iᵀ − C‖², π_i the rows of Π."""
+    """D ≥ 0 (n,) with the least Σ ‖Π D Π − C‖²: Π is a projector, Π C Π = C, and the normal
+    equations are Σ (Π ∘ Π) D = Σ diag C."""
     from scipy.optimize import nnls
 
-    gram = np.einsum("tik,tjk->tij", Pi, Pi)
-    normal = np.sum(gram**2, axis=0)
-    seen = np.einsum("tik,tkl,til->i", Pi, central, Pi)
+    normal = np.sum(Pi**2, axis=0)
+    seen = np.einsum("tii->i", central)
     # Joints that contacts move alike share a sum; of all answers the one nearest to diag C.
     even = _EVEN * float(np.trace(normal))
     normal += even * np.eye(len(normal))

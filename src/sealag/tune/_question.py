@@ -26,6 +26,7 @@ class Aim(StrEnum):
     MAPPING = "mapping"
     OPTIMAL = "optimal"
     FRONT = "front"
+    SCHEDULE = "schedule"
 
 
 class Limit(StrEnum):
@@ -36,6 +37,7 @@ class Limit(StrEnum):
     NOISE = "noise"
     ERROR = "error"
     TORQUE = "torque"
+    RATE = "rate"
 
 
 _TRANSPARENCY = frozenset({Limit.BANDWIDTH, Limit.RMS})
@@ -46,6 +48,7 @@ _TAKEN = {
     Aim.FRONT: _TRANSPARENCY,
     Aim.SHAPING: frozenset({Limit.NOISE}),
     Aim.OPTIMAL: frozenset({Limit.ERROR, Limit.TORQUE}),
+    Aim.SCHEDULE: frozenset({Limit.RATE}),
 }
 """Which limits each aim takes; none for the others."""
 _SHARED = (Aim.STIFFNESS, Aim.OPTIMAL)
@@ -83,7 +86,8 @@ class Question:
         damping_ratio: of joint PD.
         limits: of transparency: least bandwidth of the locked joints, Hz; largest RMS of Γ_sea
             against its command along the motion, Nm; of shaping: largest gain of torque noise; of
-            the quadratic index: the error (m or rad) that counts as much as the torque (Nm).
+            the quadratic index: the error (m or rad) that counts as much as the torque (Nm); of
+            a schedule: the largest rate of log K_x, 1/s.
     """
 
     system: System
@@ -115,7 +119,7 @@ class Question:
                 f"A factor for each {self.share} is found for the largest or the optimal stiffness "
                 "by the passive number only; let the share be common."
             )
-        if self.aim in (Aim.OPTIMAL, Aim.FRONT) and self.number is not Number.PASSIVE:
+        if self.aim in (Aim.OPTIMAL, Aim.FRONT, Aim.SCHEDULE) and self.number is not Number.PASSIVE:
             raise InputError(
                 f"The aim {self.aim} is a program of the passive bound; let the number be passive."
             )
@@ -164,6 +168,11 @@ class Question:
             raise InputError(
                 "The quadratic index weighs errors against torques; give the error that counts as "
                 "much as the torque (--limit error=0.02 --limit torque=30Nm)."
+            )
+        if self.aim is Aim.SCHEDULE and not (self.limits and self.moves):
+            raise InputError(
+                "A schedule follows a motion, at a rate that is bounded; give both (--motion, "
+                "--limit rate=2, in 1/s: at most twice its own size a second)."
             )
         if self.limits and self.number is not Number.PASSIVE and self.aim is not Aim.SHAPING:
             raise InputError(

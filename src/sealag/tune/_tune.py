@@ -19,6 +19,7 @@ from sealag.tune._optimal import optimal
 from sealag.tune._passive import EASE, Knobs, damped
 from sealag.tune._question import LARGEST_SAFETY, Aim, Limit, Number, Question, Share
 from sealag.tune._room import closed_text, least_of, room_of
+from sealag.tune._schedule import scheduled
 from sealag.tune._search import first_crossing
 from sealag.tune._shaping import least_shaping
 from sealag.typing import Array
@@ -60,7 +61,9 @@ def tune(
         motion: its instants; the posture if None.
         aim: stiffness, the largest K_x or K_p; bandwidth, the largest ω of joint PD, or what a
             given one tolerates; damping, the least trace D_θ; drag, the least energy that D_θ takes
-            along the motion; shaping, the least β that loop rate and torque noise allow.
+            along the motion; shaping, the least β that loop rate and torque noise allow; mapping,
+            the controller's damping in the drives; optimal, the least quadratic index; front,
+            designs that no other one beats; schedule, the largest K_x at each instant of a motion.
         number: the delay that must reach the required one: passive (closed form or a convex
             program, certified), jitter or constant (the first crossing from small gains up).
         share: what has a factor of its own: common (all tasks), task, or direction (of joint PD:
@@ -73,7 +76,8 @@ def tune(
         limits: of transparency, for stiffness, damping and drag: bandwidth, the least of the locked
             joints, Hz; rms, the largest of Γ_sea against its command along the motion, Nm. For the
             largest stiffness motor damping is set to the most that they leave. For shaping: noise,
-            the largest gain |B / B_s − 1| of torque noise.
+            the largest gain |B / B_s − 1| of torque noise. For optimal: error (m or rad) and torque
+            (Nm), which count alike. For schedule: rate, the largest of log K_x, 1/s.
 
     Returns:
         The gains, or why there are none; no gain is a result, not an error.
@@ -110,6 +114,8 @@ def tune(
         return optimal(question)
     if question.aim is Aim.FRONT:
         return front_of(question)
+    if question.aim is Aim.SCHEDULE:
+        return scheduled(question)
     if question.aim is not Aim.STIFFNESS:
         return _least_damping(question)
     if question.number is Number.PASSIVE:

@@ -53,6 +53,26 @@ def as_file(before: System, after: System) -> System:
     return replace(read, delays=after.delays)
 
 
+def with_motion(system: System, motion: str) -> str:
+    """Return a design's text that names another motion.
+
+    Args:
+        system: a design of a project file.
+        motion: the motion's file, relative to the project's.
+
+    Raises:
+        InputError: the file's dotted keys leave no place for it.
+    """
+    document = tomlkit.parse(system.text)
+    if "motion" not in document:
+        document["motion"] = tomlkit.table()
+    section: Any = document["motion"]
+    section["file"] = motion
+    return text_of(
+        document, refusal=f"{system.files[0]}: [motion] cannot be written beside its dotted keys."
+    )
+
+
 def _plain(values: ArrayLike) -> Any:
     return np.asarray(values, dtype=float).tolist()
 

@@ -40,7 +40,7 @@ class Spaces:
 
     Attributes:
         levels: (k + 1,) first row of each priority level, then m.
-        K_x: (m, m) task gains.
+        K_x: (m, m) task gains, without the motion's own factor.
         J_star: (N, m, n) contact-consistent Jacobians J*_{i|prec(i)} of Eq. (10).
         Lambda: (N, m, m) task inertias, blocks of the levels on the diagonal.
         stiffness: (N, m, m) S of the form that is run, blocks likewise.
@@ -145,6 +145,8 @@ class Spaces:
                 moved[where] = at.J_t @ at.along
             if law.gravity is GravityCompensation.FEEDBACK:
                 F_gravity[where] = _gravity_gradient(robot, q, contacts, directions=at.along)
+        if motion.stiffness is not None:
+            S *= motion.stiffness[:, None, None]
         K = actuators.spring_stiffness
         F_task = J_star.transpose(0, 2, 1) @ S @ moved
         F_q = F_task - F_gravity
