@@ -50,9 +50,9 @@ def one_joint_grids(leg: Leg) -> tuple[OneJointGrid, OneJointGrid]:
         S=one,
     )  # fmt: skip
     elastic = np.vectorize(
-        lambda d, f: delayed_margin(
-            knee.M, knee.K, knee.B_s, D=np.array([d]), F=np.array([[f]])
-        ).delay
+        lambda d, f: (
+            delayed_margin(knee.M, knee.K, knee.B_s, D=np.array([d]), F=np.array([[f]])).delay
+        )
     )(D, k)
     return (
         OneJointGrid(name="rigid", bound=bound, margin=np.vectorize(_rigid)(D, k)),

@@ -254,9 +254,7 @@ def _subsystems_claim(ports: Sequence[PortRow]) -> Claim:
             f"Observers of both over {len(ports)} runs of a leg, at the design's delay and at the "
             f"bound of (29). The joint side was passive in {sum(r.joint_passive for r in ports)}, "
             f"the controller's side in {len(ports) - len(active)}; S_c rose without supply by up "
-            "to "
-            + "; ".join(f"{drop:.2g} J ({name})" for name, drop in worst.items())
-            + "."
+            "to " + "; ".join(f"{drop:.2g} J ({name})" for name, drop in worst.items()) + "."
         ),
         verdict=Verdict.of(row.joint_passive and row.controller_passive for row in ports),
         tolerance="neither storage rises above its supply between any two instants, beyond a "
