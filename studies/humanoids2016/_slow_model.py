@@ -126,18 +126,25 @@ def _last_update(time: Array, period: float) -> Array:
 
 
 def _swing(system: System, period: float) -> Run:
-    """Hume's legs, the torso held: the right foot swings forth and back."""
+    """The right foot swings forth and back."""
+    held = held_legs(system)
+    setting = held.simulation.model_copy(update={**SWING, "model_period_ms": period * 1e3})
+    return replace(held, simulation=setting).simulate(duration=SWING_TIME)
+
+
+def held_legs(system: System) -> System:
+    """Return Hume's legs with the torso held, both feet in the air and placed by the paper's law.
+
+    Args:
+        system: Hume.
+    """
     robot = load_robot(system.robot.urdf_path, floating_base=False, actuated=system.robot.joints)
-    feet = ("right_foot", "left_foot")
     tasks = tuple(
-        Task(name=foot, kind=TaskKind.POSITION, frame=foot, stiffness=100.0) for foot in feet
+        Task(name=foot, kind=TaskKind.POSITION, frame=foot, stiffness=100.0)
+        for foot in ("right_foot", "left_foot")
     )
-    setting = system.simulation.model_copy(update={**SWING, "model_period_ms": period * 1e3})
     law = replace(
         system.law, tasks=tasks, signal=MotorAngles(), stiffness_form=StiffnessForm.SYMMETRIC
     )
-    held = replace(
-        system, robot=robot, posture=system.posture[-robot.n :], contacts=(), law=law,
-        walking=None, simulation=setting,
-    )  # fmt: skip
-    return held.simulate(duration=SWING_TIME)
+    posture = system.posture[-robot.n :]
+    return replace(system, robot=robot, posture=posture, contacts=(), law=law, walking=None)
