@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from humanoids2016._findings import Findings
 from humanoids2016._leg_loop import WILD
 from humanoids2016._page import Cell, Section, Table, Text
-from humanoids2016._ports import DURATION, PULL, THRESHOLDS, PortRow, TankRow
+from humanoids2016._ports import PULL, THRESHOLDS, PortRow, TankRow
 
 
 def ports_section(found: Findings) -> Section:
@@ -21,9 +21,9 @@ def ports_section(found: Findings) -> Section:
             Text(
                 text=(
                     "The stance leg, frozen where (29) is smallest, is pushed from rest for "
-                    f"{DURATION:g} s. Observed are S_j = V_1 at the port (Γ_sea, q̇_j) and S_c = V_2 "
-                    "+ V_3 + V_4 at (q̇_j, −Γ_sea), with E_s inside V_4 as in the paper. A subsystem "
-                    "is passive if its storage never rises above its supply between any two "
+                    f"{found.ports[0].duration:g} s. Observed are S_j = V_1 at the port (Γ_sea, "
+                    "q̇_j) and S_c = V_2 + V_3 + V_4 at (q̇_j, −Γ_sea), with E_s inside V_4 as in "
+                    "the paper. A subsystem is passive if its storage never rises above its supply between any two "
                     "instants. Where ΛK_x is not symmetric V_3 does not exist; then S_c holds half "
                     "the task's symmetric part, and the last column says what the port does "
                     "anyway. A run ends where a motor is faster than "

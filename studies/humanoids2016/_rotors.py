@@ -38,7 +38,6 @@ ROWS = 150
 TICK = 1e-3  # s
 STEP = 5e-4  # s, of the Runge-Kutta steps
 LATE = 33  # ticks: the paper's largest d_1
-SWING_TIME = 1.0  # s
 REACH, RATE = 0.15, 2.0 * np.pi  # m, rad/s: the foot's swing
 
 
@@ -165,14 +164,21 @@ class RotorTable:
         rows: one for each ratio.
         reference_rad: largest deviation of the plant without C here from the library's simulator
             over the same swing, rad.
+        swing_time: how long the swing is, s.
     """
 
     rows: tuple[RotorRow, ...]
     reference_rad: float
+    swing_time: float
 
 
 def rotor_table(
-    system: System, walk: Walk, live: LiveLeg, *, ratios: Sequence[float] = RATIOS
+    system: System,
+    walk: Walk,
+    live: LiveLeg,
+    *,
+    ratios: Sequence[float] = RATIOS,
+    swing_time: float = 1.0,
 ) -> RotorTable:
     """Compare the plants of (3) and of (4), (5).
 
@@ -181,15 +187,17 @@ def rotor_table(
         walk: the simulated walk.
         live: the stance leg along the planned walk.
         ratios: gear ratios.
+        swing_time: how long a leg swings on both plants, s.
     """
     held = held_legs(system)
-    plain, reference = _swing(held, np.inf), _simulated(held)
+    plain, reference = _swing(held, np.inf, swing_time), _simulated(held, swing_time)
     step = round(TICK / STEP)
     rows = min(len(plain[0][::step]), len(reference))
     away = float(np.abs(plain[0][::step][:rows] - reference[:rows]).max())
     return RotorTable(
         rows=tuple(_row(system, walk, live, held, plain, ratio) for ratio in ratios),
         reference_rad=away,
+        swing_time=swing_time,
     )
 
 
@@ -219,7 +227,7 @@ def _row(
         sums.append([_square(without.link[-n:]), _square(without.motor)])
         left_out.append(_square(C.T @ with_C.link + drift))
     link, motor = np.sqrt(np.sum(errors, axis=0) / np.sum(sums, axis=0)).tolist()
-    q, torque = _swing(held, ratio)
+    q, torque = _swing(held, ratio, STEP * (len(plain[0]) - 1))
     margins = np.array([_margins(live, k, ratio) for k in range(len(live.time))])
     return RotorRow(
         ratio=ratio, coupling=float(max(sizes)), link=link, motor=motor,
@@ -274,7 +282,7 @@ def _wave(rows: int):
     return reference
 
 
-def _simulated(held: System) -> Array:
+def _simulated(held: System, duration: float) -> Array:
     """The swing on the library's simulator: joint angles (N, n) at every tick."""
     still = Link(delay=Constant(value=0.0))
     late = Link(delay=Constant(value=LATE * TICK))
@@ -282,14 +290,14 @@ def _simulated(held: System) -> Array:
     run = closed_loop(
         held.robot, held.actuators,
         held.controller(reference=_wave(held.law.levels(held.robot)[-1])),
-        q=rest.q, theta=rest.theta, duration=SWING_TIME,
+        q=rest.q, theta=rest.theta, duration=duration,
         network=Network(central_up=still, central_down=late, embedded_down=still),
         clock=Clock(physics=STEP, central=TICK),
     )  # fmt: skip
     return run.q
 
 
-def _swing(held: System, ratio: float) -> tuple[Array, Array]:
+def _swing(held: System, ratio: float, duration: float) -> tuple[Array, Array]:
     """The same on the plant of (3): joint angles and spring torques (N, n) at every step."""
     robot, drives, n = held.robot, held.actuators, held.robot.n
     plant, rest = CoupledRotors(robot, drives, ratio), held.rest()
@@ -309,7 +317,7 @@ def _swing(held: System, ratio: float) -> tuple[Array, Array]:
         found = plant.accelerate(q, v, theta, rate, motor=motor)
         return np.concatenate([v, found.link, rate, found.motor])
 
-    for step in range(round(SWING_TIME / STEP) + 1):
+    for step in range(round(duration / STEP) + 1):
         if step % every == 0:
             t, out = step * STEP, np.zeros(n)
             sense(measured, t, state, drives)

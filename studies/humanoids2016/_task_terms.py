@@ -100,7 +100,7 @@ REFERENCES: Mapping[str, Mapping[tuple[int, int], float]] = {
     "CoM height on a plane of slope 0.1": {(Z, X): 0.1},
     "CoM height on a plane of slope 0.3": {(Z, X): 0.3},
     "CoM x, y left to the pendulum": {(X, X): 1.0, (Y, Y): 1.0},
-    "CoM x ahead of itself by a tenth": {(X, X): 1.1},
+    "CoM x, y twice as far as the CoM": {(X, X): 2.0, (Y, Y): 2.0},
 }
 """∂x_d/∂x by row and column: what a reference that is taken at q̄ feeds back."""
 
