@@ -80,8 +80,8 @@ def _rotors(found: Findings) -> tuple[Text, Table]:
                 "joint, spinning r times as fast about the joint's axis, C = J_ωᵀ z B/r. The plant "
                 "of (3) is integrated beside that of (4) and (5), on which the torque feedback of "
                 "(7) acts without knowing C. Without C it agrees with the simulator of all other "
-                f"sections to {found.rotors.reference_rad:.0e} rad over {found.rotors.swing_time:g} s. Hume's "
-                "gear ratios are not published."
+                f"sections to {found.rotors.reference_rad:.0e} rad over "
+                f"{found.rotors.swing_time:g} s. Hume's gear ratios are not published."
             )
         ),
         Table(

@@ -190,7 +190,8 @@ def _port_rows(leg: Leg, fed: Fed, *, own: float, duration: float) -> Iterator[P
                 leg=leg.name, fed=fed, push=push.name, delay_s=delay, near_bound=delay == near,
                 tolerance=run.tolerance, joint_drop=_drop(run.joint_slack),
                 controller_drop=_drop(run.controller_slack), given=float(-run.port.min()),
-                fastest=run.fastest, speed_bound=run.speed_bound, potential=symmetric, duration=duration,
+                fastest=run.fastest, speed_bound=run.speed_bound, potential=symmetric,
+                duration=duration,
             )  # fmt: skip
 
 
@@ -333,8 +334,8 @@ def _threshold_claim(tanks: Sequence[TankRow]) -> Claim:
         published="With ε close enough to zero the energy tank is never empty.",
         computed=(
             f"With ε = {least:g} the tank lasts in {len(never)} of {len(small)} runs ({kept}), "
-            f"with ε = {most:g} in {sum(row.emptied is None for row in large)}; where it empties, the "
-            f"smaller ε gains at most {later * 1e3:.0f} ms. What decides is E_s(0) against "
+            f"with ε = {most:g} in {sum(row.emptied is None for row in large)}; where it empties, "
+            f"the smaller ε gains at most {later * 1e3:.0f} ms. What decides is E_s(0) against "
             "½d̄∫(x̂̇ᵀQx̂̇ − v_2ᵀQv_2)dt, which has no end while the robot is pushed."
         ),
         verdict=Verdict.of(row.emptied is None for row in small),

@@ -23,10 +23,10 @@ def ports_section(found: Findings) -> Section:
                     "The stance leg, frozen where (29) is smallest, is pushed from rest for "
                     f"{found.ports[0].duration:g} s. Observed are S_j = V_1 at the port (Γ_sea, "
                     "q̇_j) and S_c = V_2 + V_3 + V_4 at (q̇_j, −Γ_sea), with E_s inside V_4 as in "
-                    "the paper. A subsystem is passive if its storage never rises above its supply between any two "
-                    "instants. Where ΛK_x is not symmetric V_3 does not exist; then S_c holds half "
-                    "the task's symmetric part, and the last column says what the port does "
-                    "anyway. A run ends where a motor is faster than "
+                    "the paper. A subsystem is passive if its storage never rises above its "
+                    "supply between any two instants. Where ΛK_x is not symmetric V_3 does not "
+                    "exist; then S_c holds half the task's symmetric part, and the last column "
+                    "says what the port does anyway. A run ends where a motor is faster than "
                     f"{WILD:g} rad/s."
                 )
             ),
