@@ -99,7 +99,7 @@ class PrintedTask:
         if case.swing:
             below = Task(
                 name="swing foot", kind=TaskKind.POSITION, frame=swing, priority=2,
-                stiffness=SWING_STIFFNESS,
+                stiffness=np.array(SWING_STIFFNESS),
             )  # fmt: skip
             tasks = (*tasks, below)
         law = Law(

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 MOST_NAMED = 3
+PRIOR = 20.0
+"""s for which an idle machine's pace counts, so that one slow stage does not tell the whole."""
 BUSY = 0.5
 """Load beyond the processors from which the study waits for others."""
 
@@ -35,7 +37,7 @@ class Progress:
         """
         self.stages, self._tell, self._clock = stages, tell, clock
         self._others = others or waits_for
-        self._start, self._done = clock(), 0
+        self._start = clock()
 
     def begin(self, stage: str) -> None:
         """Say that a stage begins.
@@ -46,12 +48,11 @@ class Progress:
         names, seconds = list(self.stages), list(self.stages.values())
         k = names.index(stage)
         before, rest = sum(seconds[:k]), sum(seconds[k:])
-        pace = (self._clock() - self._start) / before if before else 1.0
+        pace = (self._clock() - self._start + PRIOR) / (before + PRIOR)
         text = f"[{k + 1}/{len(names)}] {stage}; {_duration(rest * pace)} left"
         others = self._others()
         if others:
             text += f"; waits for {others}"
-        self._done = k
         self._tell(text)
 
 

@@ -82,7 +82,8 @@ def slow_models(
         asymmetry = _norm(F - np.swapaxes(F, 1, 2)) / _norm(F + np.swapaxes(F, 1, 2))
         problem = Problem.of_stiffness(F[standing], system.actuators.motor_damping)
         margins = np.array([
-            _leg_margin(system, M, F[k], columns[k]) for M, k in zip(masses, pick, strict=True)
+            _leg_margin(system, M, F[k], columns[k].tolist())
+            for M, k in zip(masses, pick, strict=True)
         ])  # fmt: skip
         run = first if period == 0.0 else _swing(system, period)
         rows = min(len(run.time), len(first.time))
@@ -139,8 +140,9 @@ def held_legs(system: System) -> System:
         system: Hume.
     """
     robot = load_robot(system.robot.urdf_path, floating_base=False, actuated=system.robot.joints)
+    gain = np.array(100.0)
     tasks = tuple(
-        Task(name=foot, kind=TaskKind.POSITION, frame=foot, stiffness=100.0)
+        Task(name=foot, kind=TaskKind.POSITION, frame=foot, stiffness=gain)
         for foot in ("right_foot", "left_foot")
     )
     law = replace(

@@ -142,9 +142,12 @@ def test_time_left_follows_what_the_stages_took():
     progress = Progress(stages, said.append, clock=lambda: now[0], others=lambda: "")
     progress.begin("a")
     assert said[-1] == "[1/3] a; about 2 min left"
-    now[0] = 30.0  # three times as slow as an idle machine
+    now[0] = 30.0  # three times as slow as an idle machine, on little evidence
     progress.begin("b")
-    assert said[-1] == "[2/3] b; about 6 min left"
+    assert said[-1] == "[2/3] b; about 3 min left"
+    now[0] = 300.0
+    progress.begin("c")
+    assert said[-1] == "[3/3] c; about 13 min left"
     busy = Progress(stages, said.append, clock=lambda: now[0], others=lambda: "blender (load 5)")
     busy.begin("a")
     assert said[-1] == "[1/3] a; about 2 min left; waits for blender (load 5)"

@@ -164,9 +164,9 @@ class _Tracking:
 
 def _controller(system: Design, kind: str, q: Array) -> TickController:
     """The design's controller, holding where it stands or tracking about it."""
-    slow = {"model_period": seconds_from_ms(system.simulation.model_period_ms)}
+    slow = seconds_from_ms(system.simulation.model_period_ms)
     if kind != "track":
-        return system.controller(None if system.program is not None else q, **slow)
+        return system.controller(None if system.program is not None else q, model_period=slow)
     m = system.law.levels(system.robot)[-1]
     w = 2.0 * math.pi * system.simulation.track_frequency_hz
     size, row = system.simulation.track_amplitude, np.eye(m)[0]
@@ -174,7 +174,7 @@ def _controller(system: Design, kind: str, q: Array) -> TickController:
     def wave(t: float) -> tuple[Array, Array]:
         return size * (1.0 - math.cos(w * t)) / 2.0 * row, size * w * math.sin(w * t) / 2.0 * row
 
-    return _Tracking(system.controller(q, reference=wave, **slow))
+    return _Tracking(system.controller(q, reference=wave, model_period=slow))
 
 
 def _feet(system: Design) -> list[Foot]:
