@@ -28,11 +28,12 @@ def _slow(found: Findings) -> tuple[Text, Table]:
     rows = []
     for one in found.slow:
         stale = "–" if one.stale_asymmetry < 0.0 else f"{one.stale_asymmetry:.2f}"
+        unstable = f"{one.unstable} of {one.stale}" if one.stale else "–"
         rows.append([
             _number("every tick" if one.period == 0.0 else f"{one.period * 1e3:g}"),
             _number(f"{one.asymmetry:.3f}"), _number(f"{one.bound_s * 1e3:.2f}"),
             _number(f"{one.margin_s * 1e3:.2f}"), _number(stale),
-            _number(f"{one.unstable} of {one.stale}"),
+            _number(unstable),
             _number(f"{one.away_rad * 1e3:.2f}"), _number(f"{one.torque_nm:.2f}"), one.outcome,
         ])  # fmt: skip
     return (
@@ -127,8 +128,8 @@ def _terms(found: Findings) -> tuple[Text, Table]:
                 "exact margin (ms)", "unstable",
             ],
             rows=rows,
-            note="The stance leg at 40 instants of the planned walk, its torso held; (29) with "
-            "this F for J*ᵀΛK_x J*. A reference in front of the state that feeds it makes F "
-            "indefinite.",
+            note=f"The stance leg at {found.references[0].instants} instants of the planned walk, "
+            "its torso held; (29) with this F for J*ᵀΛK_x J*. Least eigenvalue of the symmetric part; "
+            "an asymmetric F has no potential, whatever (29) says.",
         ),
     )  # fmt: skip

@@ -45,7 +45,8 @@ def ports_section(found: Findings) -> Section:
                     "The tank is that of (19) to (22), with v_1 and K_b = diag("
                     + ", ".join(f"{value:g}" for value in PULL)
                     + ") 1/s. E_s is integrated instead of s, which overshoots through 0. Only "
-                    "the corrected flow keeps V from rising; neither lasts for ever."
+                    "the corrected flow keeps V from rising. Motion drains both: what lasts this "
+                    "long need not last for ever."
                 )
             ),
             Table(
