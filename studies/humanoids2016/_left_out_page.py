@@ -129,7 +129,7 @@ def _terms(found: Findings) -> tuple[Text, Table]:
             ],
             rows=rows,
             note=f"The stance leg at {found.references[0].instants} instants of the planned walk, "
-            "its torso held; (29) with this F for J*ᵀΛK_x J*. Least eigenvalue of the symmetric part; "
-            "an asymmetric F has no potential, whatever (29) says.",
+            "its torso held; (29) with this F for J*ᵀΛK_x J*. Least eigenvalue of the symmetric "
+            "part; an asymmetric F has no potential, whatever (29) says.",
         ),
     )  # fmt: skip
