@@ -8,6 +8,7 @@ belong to y. Only the work through a port is a trapezoid.
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -249,11 +250,20 @@ def run_leg(
         increments[k + 1] = U + moved
         y[k + 1] = y[k] + increments[k + 1]
     empty[count] = empty[count - 1]
-    rows = slice(count + 1)
-    return _observed(
-        leg, fed, z[rows], y[rows], increments[rows], energy[rows], empty[rows], time[rows],
-        force[rows], Q=Q, late=late,
-    )  # fmt: skip
+    logged = _Log(z, y, increments, energy, empty, time, force)
+    return _observed(leg, fed, _Log(*(part[: count + 1] for part in logged)), Q=Q, late=late)
+
+
+class _Log(NamedTuple):
+    """What a run leaves behind, at N instants."""
+
+    z: Array  # (N, 4n) q, θ, q̇, θ̇
+    y: Array  # (N, m) what is fed back
+    increments: Array  # (N, m) of y, since the instant before
+    energy: Array  # (N,) E_s, J
+    empty: BoolArray  # (N,) whether the tank is
+    time: Array  # (N,) s
+    force: Array  # (N, n) of the push, Nm
 
 
 def _discrete(leg: Leg, h: float) -> tuple[Array, Array, Array]:
@@ -276,21 +286,9 @@ def _discrete(leg: Leg, h: float) -> tuple[Array, Array, Array]:
     return whole[: 4 * n, : 4 * n], constant - slope, slope
 
 
-def _observed(
-    leg: Leg,
-    fed: Fed,
-    z: Array,
-    y: Array,
-    increments: Array,
-    energy: Array,
-    empty: BoolArray,
-    time: Array,
-    force: Array,
-    *,
-    Q: Array,
-    late: int,
-) -> LegRun:
+def _observed(leg: Leg, fed: Fed, log: _Log, *, Q: Array, late: int) -> LegRun:
     """Energies and works of a run."""
+    z, y, increments, energy, empty, time, force = log
     n, h = len(leg.K), time[1]
     q, theta, q_dot, theta_dot = (z[:, k * n : (k + 1) * n] for k in range(4))
     spring = leg.K * (theta - q)
