@@ -167,14 +167,15 @@ def _sweep_rates(project: str, *, as_json: bool) -> None:
     """Show what each sample rate tolerates."""
     system = design.load(project)
     compile_kernels()
-    with busy("lifting sampled loops"):
+    with busy("sampling the loop at each rate"):
         rates = system.rate_sweep()
     if as_json:
         show_json({"rates": [rate.summary() for rate in rates]})
         return
     show("rate          largest delay   proven          the design's, without the hold")
     for rate in rates:
-        largest = "not lifted" if rate.largest_s is None else time_text(rate.largest_s)
+        # too many commands wait for the exact loop: only the proven delay is known
+        largest = "not found" if rate.largest_s is None else time_text(rate.largest_s)
         verdict = {True: "stable", False: "unstable", None: "open"}[rate.stable]
         show(
             f"{rate.rate_hz:7.1f} Hz    {largest:15} {time_text(rate.proven_s):15} "
