@@ -39,6 +39,7 @@ from humanoids2016._rotors import CoupledRotors, RotorRow, RotorTable, rotor_tab
 from humanoids2016._slow_model import SlowModel, held_legs, slow_models
 from humanoids2016._study import planned_walk, reproduce, study
 from humanoids2016._task_terms import ReferenceRow, TaskTerms, reference_rows, task_terms
+from humanoids2016._torque_rate import TorqueRateRow, torque_rate_rows
 from humanoids2016._unsafe import UnsafeExample, delayed_margin, unsafe_examples
 from humanoids2016._walk import Walk, WalkCase, at_delay_scale, simulate_walk, walking_of
 from humanoids2016._walk_errors import NoisySensors, SensorNoise, wrong_robot, wrong_springs
@@ -86,6 +87,7 @@ __all__ = [
     "TankRow",
     "TankSetting",
     "TaskTerms",
+    "TorqueRateRow",
     "TorqueTrace",
     "UnsafeExample",
     "Verdict",
@@ -134,6 +136,7 @@ __all__ = [
     "study",
     "tank_table",
     "task_terms",
+    "torque_rate_rows",
     "unsafe_examples",
     "waits_for",
     "walk_claim",

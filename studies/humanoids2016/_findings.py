@@ -15,6 +15,7 @@ from humanoids2016._random_table import RandomPlantTable
 from humanoids2016._rotors import RATIOS, RotorTable
 from humanoids2016._slow_model import PERIODS, SlowModel
 from humanoids2016._task_terms import ReferenceRow, TaskTerms
+from humanoids2016._torque_rate import TorqueRateRow
 from humanoids2016._unsafe import UnsafeExample
 from humanoids2016._walk import Walk
 from humanoids2016._walk_table import WalkRow
@@ -114,6 +115,7 @@ class Findings:
         rotors: the error of Assumption 3.
         terms: sizes of μ and F_c.
         references: references that are functions of q̄.
+        torque_rates: spring damping, and feedback of the torque's derivative.
         certificate: over the planned walk, with the bound for matrices that vary in time.
         claims: statements of the paper, checked.
     """
@@ -146,5 +148,6 @@ class Findings:
     rotors: RotorTable
     terms: TaskTerms
     references: tuple[ReferenceRow, ...]
+    torque_rates: tuple[TorqueRateRow, ...]
     certificate: Certificate
     claims: tuple[Claim, ...]

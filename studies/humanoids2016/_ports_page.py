@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from humanoids2016._findings import Findings
 from humanoids2016._leg_loop import WILD
 from humanoids2016._page import Cell, Section, Table, Text
-from humanoids2016._ports import PULL, THRESHOLDS, PortRow, TankRow
+from humanoids2016._ports import ENDLESS, PULL, THRESHOLDS, PortRow, TankRow
 
 
 def ports_section(found: Findings) -> Section:
@@ -83,7 +83,8 @@ def _port_row(row: PortRow) -> list[Cell | str]:
 def _passive(passive: bool, drop: float) -> Cell:
     if passive:
         return Cell(text="passive", css="verdict confirmed")
-    return Cell(text=f"active, {drop:.2g} J", css="verdict contradicted")
+    given = f"{drop:.2g} J" if drop < ENDLESS else "without end"
+    return Cell(text=f"active, {given}", css="verdict contradicted")
 
 
 def _tank_rows(tanks: Sequence[TankRow]) -> list[list[Cell | str]]:

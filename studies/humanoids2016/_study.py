@@ -28,6 +28,7 @@ from humanoids2016._random_table import random_plant_table
 from humanoids2016._rotors import rotor_table
 from humanoids2016._slow_model import slow_models
 from humanoids2016._task_terms import reference_rows, task_terms
+from humanoids2016._torque_rate import torque_rate_rows
 from humanoids2016._unsafe import unsafe_examples
 from humanoids2016._walk import WalkCase, simulate_walk, walking_of
 from humanoids2016._walk_table import (
@@ -216,6 +217,7 @@ def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> 
         rotors=rotors,
         terms=task_terms(system, walk),
         references=reference_rows(live),
+        torque_rates=torque_rate_rows(live),
         certificate=certificate,
         claims=(
             *figure_4_claims(figure, table),

@@ -18,6 +18,7 @@ from humanoids2016 import (
     simulate_walk,
     slow_models,
     task_terms,
+    torque_rate_rows,
     waits_for,
 )
 from sealag.design import load
@@ -134,6 +135,14 @@ def test_a_reference_of_q_bar_is_feedback(walked):
     assert rows["CoM height on a plane of slope 0.3"].asymmetry > 1e-3
     left = rows["CoM x, y left to the pendulum"]
     assert left.bound_s > plain.bound_s  # less stiffness, more delay
+
+
+def test_torque_rate_feedback_makes_the_damping_symmetric_again(walked):
+    _, _, live = walked
+    none, some = torque_rate_rows(live, damping=(0.0, 4.0))
+    assert none.without_s == none.with_s == pytest.approx(reference_rows(live)[0].margin_s)
+    assert none.asymmetry == 0.0 < some.asymmetry
+    assert some.without_s != pytest.approx(some.with_s, rel=1e-4)
 
 
 def test_time_left_follows_what_the_stages_took():
