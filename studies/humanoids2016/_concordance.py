@@ -61,8 +61,8 @@ ROWS = (
         "paper leaves out”."),
     Row("Assumption 4", "d_1 = T_H + T_L/2 and d_2 have upper bounds.", "Taken from the delays of "
         "the project, with jitter, loss and the hold of the sampled controller."),
-    Row("Remark 1", "Feedback of the torque's derivative.", "Spring damping with and without it, section "
-        "“What the paper leaves out”."),
+    Row("Remark 1", "Feedback of the torque's derivative.", "Spring damping with and without it, "
+        "section “What the paper leaves out”."),
     Row("Remark 2", "ḡ(θ) is gravity at q̄.", "gravity = \"feedback\"; its gradient counts as "
         "stiffness."),
     Row("Section III, [16]", "Delayed damping hurts more than delayed stiffness.", "Claim “central "
