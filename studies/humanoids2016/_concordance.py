@@ -87,8 +87,8 @@ ROWS = (
         "embedded_down in the project file; d_1 is what certificate and simulation take. A "
         "constant delay acts alike on both ways; a varying one need not."),
     Row("Future work (iii)", "Optimal central controller; central against embedded damping.",
-        "Claim “central damping”: what it costs to compute damping centrally. An optimal "
-        "controller is not designed here."),
+        "Claim “central damping”: what it costs to compute damping centrally. sealag tune --aim "
+        "mapping and --aim optimal; docs/theory, section 16."),
     Row("Future work (iv)", "Experiments; Coulomb friction, torque bandwidth.", "Walks with both, "
         "section “Beyond the paper”. No experiment on hardware."),
 )  # fmt: skip

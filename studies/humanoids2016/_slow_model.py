@@ -8,7 +8,7 @@ import numpy as np
 from humanoids2016._figure4 import stance_columns
 from humanoids2016._live import stance_masses
 from humanoids2016._unsafe import delayed_margin
-from sealag.design import System
+from sealag.design import System, simulate
 from sealag.passivity import Instant, Problem, solve
 from sealag.robot import Motion, load_robot
 from sealag.simulation import Run
@@ -130,7 +130,7 @@ def _swing(system: System, period: float) -> Run:
     """The right foot swings forth and back."""
     held = held_legs(system)
     setting = held.simulation.model_copy(update={**SWING, "model_period_ms": period * 1e3})
-    return replace(held, simulation=setting).simulate(duration=SWING_TIME)
+    return simulate(replace(held, simulation=setting), duration=SWING_TIME)
 
 
 def held_legs(system: System) -> System:

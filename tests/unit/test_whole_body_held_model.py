@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from helpers.designs import EXAMPLES
-from sealag.design import load
+from sealag.design import load, simulate
 from sealag.errors import InputError
 from sealag.whole_body import LinkAngles, Measurement, MotorAngles, StaticJoint, Tank
 
@@ -102,7 +102,7 @@ def with_period(system, ms):
 def test_a_tracking_arm_feels_a_slow_model_and_less_of_a_faster_one():
     """The deviation from a model of every tick grows with the period."""
     runs = {
-        ms: with_period(BAXTER, ms).simulate(scenario="track", duration=0.6)
+        ms: simulate(with_period(BAXTER, ms), scenario="track", duration=0.6)
         for ms in (0.0, 50.0, 300.0)
     }
     away = {ms: np.abs(run.q - runs[0.0].q).max() for ms, run in runs.items()}
@@ -112,8 +112,8 @@ def test_a_tracking_arm_feels_a_slow_model_and_less_of_a_faster_one():
 def test_what_cannot_hold_a_model_says_so():
     tank = replace(BAXTER, law=replace(BAXTER.law, signal=Tank()))
     with pytest.raises(InputError, match=r"simulation\.model_period_ms"):
-        with_period(tank, 20.0).simulate(duration=0.01)
-    tank.simulate(duration=0.01)
+        simulate(with_period(tank, 20.0), duration=0.01)
+    simulate(tank, duration=0.01)
     hume = with_period(load("bundled:hume"), 20.0)
     with pytest.raises(InputError, match=r"simulation\.model_period_ms.*\[walking\]"):
-        hume.simulate(scenario="walk", duration=0.01)
+        simulate(hume, scenario="walk", duration=0.01)
