@@ -256,6 +256,13 @@ MUTANTS = [
          "return np.zeros_like(carried)", "where link angles let springs rest"),
         ("energy -= 0.5 * float(out.dot(out / self._law.spring_stiffness))", "pass",
          "potential of q̄(θ)"),
+    ),
+    *_of(
+        "law", "whole_body/_slopes.py",
+        ("inverse = np.linalg.inv(eye - reached @ moved)", "inverse = np.eye(robot.nv)",
+         "motions that turn with the configuration"),
+        ("turned, reached = _placed(robot, q, carried)", "turned, reached = eye, eye",
+         "a base that is placed by the exponential of its twist"),
         ("near, far = 4.0 / (3.0 * width), 1.0 / (6.0 * width)",
          "near, far = 2.0 / (3.0 * width), -1.0 / (6.0 * width)",
          "extrapolated differences: accuracy only"),

@@ -97,7 +97,7 @@ class DelayedLoop:
             confirm=confirm,
         )
 
-    def jitter_margin(self) -> JitterMargin:
+    def jitter_margin(self, *, at_most: float | None = None) -> JitterMargin:
         """Largest delay below which d may vary as it likes; docs/theory section 7.4.
 
         Broken at y = R x with C = L R, the loop is y − y(t − τ) = w, w = Δ ẏ with
@@ -115,7 +115,11 @@ class DelayedLoop:
         its own ε ≤ e, is a second Δ with a multiplier of its own, and varies as it likes too.
 
         Cost: an eigenvalue problem of 2 n a step, three or four steps: 10 ms for 36 states, 0.3 s
-        for 76.
+        for 76; one step where `at_most` is proven.
+
+        Args:
+            at_most: longest delay of interest, s: whether it is proven takes one step; None for the
+                largest one.
 
         Returns:
             The margin, at most that of `margin`, which is of constant delays only.
@@ -124,7 +128,8 @@ class DelayedLoop:
             InputError: matrices do not fit or are not finite real numbers, or a time is negative.
             SolverError: a matrix moves a symmetry, or rounding leaves the norm open.
         """
-        return jitter_margin(*self._parts())
+        longest = None if at_most is None else time_of("at_most", at_most)
+        return jitter_margin(*self._parts(), at_most=longest)
 
     def sampled_margin(self, period: float) -> SampledMargin:
         """Largest constant delay of the loop sampled and held; docs/theory section 7.6.

@@ -33,8 +33,10 @@ class JitterMargin:
 
     Attributes:
         delay: s; the loop is stable for every measurable τ(t) with 0 ≤ τ(t) ≤ delay. 0 where a root
-            is not in the open left half-plane without delay, inf where nothing is late.
-        upper: s; no multiplier X proves more. A longer delay need not be unstable.
+            is not in the open left half-plane without delay, inf where nothing is late; `at_most`
+            where that was given and is proven.
+        upper: s; no multiplier X proves more. A longer delay need not be unstable. inf where
+            `at_most` is proven.
         frequency: at which the bound is reached, rad/s; inf above all roots, NaN without a bound.
         unstable_roots: roots not in the open left half-plane without delay, symmetries left out.
         neutral: structural zero roots taken out.
@@ -47,17 +49,19 @@ class JitterMargin:
     neutral: int
 
 
-def jitter_margin(loop: Loop, broken: "Broken") -> JitterMargin:
+def jitter_margin(loop: Loop, broken: "Broken", *, at_most: float | None = None) -> JitterMargin:
     """Bound `DelayedLoop.jitter_margin`.
 
     Args:
         loop: the prepared loop.
         broken: it, broken where it is late.
+        at_most: longest delay of interest, s.
     """
     unstable = roots_at_once(loop.A_0 + loop.A_1 + loop.A_e)[0] if len(loop.A_0) else 0
     found = _Bound(0.0, 0.0, math.nan)
     if not unstable:
-        found = _bound(broken, loop.embedded_delay)
+        enough = None if at_most is None or at_most <= 0.0 else _tolerates(broken, at_most)
+        found = enough or _bound(broken, loop.embedded_delay)
     return JitterMargin(
         delay=found.delay, upper=found.upper, frequency=found.frequency, unstable_roots=unstable,
         neutral=loop.neutral,
@@ -207,6 +211,24 @@ def _with_drives(broken: Broken, e: float) -> tuple[float, float]:
         frequency = peak.frequency
         delay *= 1.0 - min(2.0 * (peak.high - 1.0) + _BRACKET, 0.5)
     return 0.0, math.nan
+
+
+def _tolerates(broken: Broken, delay: float) -> _Bound | None:
+    """Whether a delay is proven: no singular value of T reaches its reciprocal at any frequency.
+
+    Responses are below it above all roots, and can only reach it where the Hamiltonian matrix of
+    this level has an eigenvalue on the axis; what rounding could hold there counts as such.
+    """
+    if broken.late != len(broken.right) or not broken.late or not math.isfinite(delay):
+        return None
+    one = np.ones(len(broken.right))
+    plain, level = broken.scaled(one, one), 1.0 / delay
+    if float(np.linalg.norm(plain.D, 2)) * (1.0 + _BRACKET) >= level:
+        return None
+    roots, error = eigenvalues_with_error(plain.hamiltonian(level))
+    if (np.abs(roots.real) <= error).any():
+        return None
+    return _Bound(delay, math.inf, math.nan)
 
 
 def _adjoint(stack: Array) -> Array:
