@@ -63,7 +63,9 @@ TESTS = {
     "cli": "tests/cli/test_cli_terminal.py tests/cli/test_cli_status.py "
            "tests/cli/test_cli_certify.py tests/cli/test_cli_simulate.py",
     "tune": "tests/unit/test_tune_limits.py tests/unit/test_tune_margins.py "
-            "tests/unit/test_tune_motion.py tests/cli/test_cli_tune.py",
+            "tests/unit/test_tune_motion.py tests/unit/test_tune_optimal.py "
+            "tests/unit/test_tune_front.py tests/unit/test_tune_mapping.py "
+            "tests/unit/test_picture.py tests/cli/test_cli_tune.py",
     "units": "tests/unit/test_units.py tests/unit/test_design_starter.py",
 }  # fmt: skip
 """Tests of each room, those that are quick first."""
@@ -471,7 +473,7 @@ MUTANTS = [
         ("if len(motion) > 1:", "if True:", "one instant is a posture"),
     ),
     *_of(
-        "design", "design/_certify.py",
+        "design", "design/_findings.py",
         ("if not reasons and (delay_s > largest or",
          "if not reasons and (delay_s > 2.0 * largest or",
          "a delay that is too long is certified"),
@@ -753,8 +755,8 @@ MUTANTS = [
         ("drives.spring_stiffness, delay / drives.motor_damping",
          "drives.spring_stiffness, delay / drives.motor_damping / 1.001",
          "stiffness above the delay's limit"),
-        ("return Limits(parts=self._parts, held=self._held, series=series)",
-         "return Limits(parts=self._parts, held=-self._held, series=series)",
+        ("return Limits(parts=self.parts, held=self._held, series=series)",
+         "return Limits(parts=self.parts, held=-self._held, series=series)",
          "gravity compensation with the wrong sign"),
         ("cost = np.maximum(cost, _AT_REST * cost.mean())", "cost = np.ones_like(cost)",
          "drag that is a trace"),
@@ -781,6 +783,9 @@ MUTANTS = [
         "tune", "tune/_answer.py",
         ("reached >= question.required and not reasons", "reached >= question.required",
          "found, but not certified"),
+    ),
+    *_of(
+        "tune", "tune/_numbers.py",
         ("if _unstable(question, system):", "if False:",
          "minutes spent on loops that grow without delay"),
     ),
@@ -800,5 +805,35 @@ MUTANTS = [
         "tune", "tune/_limits.py",
         ("both = np.concatenate([F, -F]) if np.linalg.eigvalsh(F).min() < 0.0 else F",
          "both = F", "damping for one sign of the stiffness only"),
+    ),
+    *_of(
+        "tune", "tune/_mapping.py",
+        ("seen = np.einsum(\"tik,tkl,til->i\", Pi, central, Pi)",
+         "seen = np.einsum(\"tii->i\", central)", "the plain diagonal under contacts"),
+        ("replace(task, damping=(1.0 - share) *", "replace(task, damping=1.0 *",
+         "damping in the drives and in the controller"),
+    ),
+    *_of(
+        "tune", "tune/_optimal.py",
+        ("value=inverse.value - count * self._R * self._K.sum() - float(held)",
+         "value=inverse.value - count * self._R * self._K.sum()",
+         "the springs' part of the error left in the index"),
+        ("if index.knobs.limits(delay).wall(free).scale >= 1.0:",
+         "if index.knobs.limits(delay).wall(free).scale >= 0.0:", "a delay that stops nothing"),
+        ("weight = rows**2 @ self._D", "weight = rows**2 @ np.ones_like(self._D)",
+         "Riccati's index without the damping"),
+    ),
+    *_of(
+        "tune", "tune/_front.py",
+        ("if not (twin or (reached & better).any()):", "if not twin:",
+         "points that others beat"),
+        ("point = _point(limited, design, room, float(delay), scale)",
+         "point = _point(limited, design, room, 0.9 * float(delay), scale)",
+         "damping for less than the delay of the curve"),
+    ),
+    *_of(
+        "tune", "picture.py",
+        ("_GREYS = (\"0.0\", \"0.35\",", "_GREYS = (\"C0\", \"0.35\",", "a curve in colour"),
+        ("if high < _FEW * low:", "if False:", "numbers of ticks as powers of ten"),
     ),
 ]  # fmt: skip

@@ -33,7 +33,7 @@ def test_a_push_dies_out_with_the_tuned_gains_only(delay):
         task = tuned.system.law.tasks[0]
         task = replace(task, stiffness=factor * np.asarray(task.stiffness))
         design = replace(tuned.system, law=replace(tuned.system.law, tasks=(task,)))
-        run = design.simulate(scenario="balance", duration=2.8)
+        run = sealag.simulate(design, scenario="balance", duration=2.8)
         growth.append(fastest(run, 2.4, 2.8) / fastest(run, 0.4, 0.6))
         if factor == 1.0:
             assert run.outcome == "completed"

@@ -99,9 +99,8 @@ def test_a_push_dies_down_or_shakes_the_legs(tmp_path):
     """7 ms around the loop: 26 ms are tolerated in the drives, 1.5 ms in the controller."""
     last = {}
     for place in ("drive", "controller"):
-        run = sealag.load(go2(tmp_path, damping_at=place)).simulate(
-            scenario="balance", duration=1.2
-        )
+        project = go2(tmp_path, damping_at=place)
+        run = sealag.simulate(project, scenario="balance", duration=1.2)
         last[place] = float(np.abs(run.v[-150:, 6:]).max())
     assert last["drive"] < 0.1
     assert last["controller"] > 0.5

@@ -138,7 +138,7 @@ def test_it_is_read_from_a_file_and_names_its_joints(tmp_path):
 
 def test_it_runs_in_the_simulator_and_is_swept(tmp_path):
     system = arm(tmp_path, FILTERED)
-    run = system.simulate(scenario="regulate", duration=0.05)
+    run = sealag.simulate(system, scenario="regulate", duration=0.05)
     np.testing.assert_allclose(run.v, 0.0, atol=1e-6)
     assert system.rate_sweep([200.0])[0].stable is False
     own = arm(tmp_path, discrete(), time="discrete").rate_sweep()

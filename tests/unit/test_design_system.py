@@ -39,7 +39,7 @@ def test_it_answers_every_question_without_a_file(system):
     assert certificate.answer.local_margin_s == pytest.approx(margin, rel=1e-9)
     assert system.local_margins().delay_s == pytest.approx(margin, rel=1e-9)
     assert certificate.question.delay_s == system.delays.d_1
-    run = system.simulate(scenario="regulate", duration=0.05)
+    run = sealag.simulate(system, scenario="regulate", duration=0.05)
     assert run.outcome is Outcome.COMPLETED
     measured, out = Measurement.allocate(nq=2, nv=2, n=2), np.zeros(2)
     rest = system.rest()

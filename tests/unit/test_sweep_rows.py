@@ -13,6 +13,7 @@ import sealag
 from helpers.source import ROOT
 from helpers.sweeps import PROJECT, two_joints
 from helpers.toml import to_toml
+from sealag.design import System
 from sealag.errors import FileError, InputError
 from sealag.sweep import Sweep
 
@@ -43,19 +44,84 @@ def edited(project, stiffness, delay):
     return sealag.load(path)
 
 
+def same_as_certify(row, system, motion=None):
+    answer = sealag.certify(system, motion).confirmed().answer
+    told = {
+        "status": answer.status.value,
+        "delay_s": system.delays.d_1,
+        "reasons": "; ".join(answer.reasons),
+        "worst_instant": answer.worst.instant,
+        "worst_time_s": answer.worst.time_s,
+        "limiting_joint": max(answer.worst.direction, key=answer.worst.direction.get),
+    }
+    names = ("max_delay_s", "local_margin_s", "first_crossing_s", "stable", "unstable_modes")
+    told |= {name: getattr(answer, name) for name in names}
+    assert {name: row[name] for name in told} == told
+    assert row["error"] is None or pandas.isna(row["error"])
+
+
 def test_certificates_are_those_of_edited_files(project, tmp_path):
     rows = rows_of(Sweep.of(project, GRID), tmp_path / "o", jobs=1)
     assert rows["point"].tolist() == [0, 1, 2, 3]
     for row in rows.to_dict("records"):
-        answer = sealag.certify(edited(project, row[HAND], row[DELAY])).answer
-        assert row["status"] == answer.status
-        assert row["max_delay_s"] == answer.max_delay_s
-        assert row["local_margin_s"] == answer.local_margin_s
-        assert row["stable"] == answer.stable
-        assert row["limiting_joint"] in ("j1", "j2")
-        assert row["error"] is None or pandas.isna(row["error"])
+        same_as_certify(row, edited(project, row[HAND], row[DELAY]))
     assert rows["delay_s"].tolist() == pytest.approx([0.006, 0.402, 0.006, 0.402], abs=2e-3)
     assert set(rows["status"]) == {"certified", "not_certified"}
+
+
+def test_designs_that_differ_in_delays_share_what_is_computed(project, tmp_path, monkeypatch):
+    """Along a motion: bounds, proofs and loops once for each stiffness, with the rows of each."""
+    path = tmp_path / "motion.csv"
+    path.write_text("time_s,j1,j2\n0,0.4,0.5\n0.1,0.42,0.5\n0.2,0.45,0.52\n")
+    calls = []
+    sweep = Sweep.of(project, (f"{DELAY}=1,4,80,1000", f"{HAND}=20,80,5000"), motion=path)
+    with monkeypatch.context() as counted:
+        findings = System.findings
+        counted.setattr(System, "findings", lambda *of: calls.append(of) or findings(*of))
+        rows = rows_of(sweep, tmp_path / "o", jobs=1)
+    assert len(calls) == 3
+    assert rows[[HAND, DELAY]].values.tolist() == [
+        [stiffness, delay] for stiffness in (20, 80, 5000) for delay in (1, 4, 80, 1000)
+    ]
+    for row in rows.to_dict("records"):
+        same_as_certify(row, edited(project, row[HAND], row[DELAY]), path)
+    assert len(set(rows["status"])) > 1
+    bounds = rows_of(
+        Sweep.of(project, (f"{DELAY}=1,4,80,1000", f"{HAND}=20,80,5000"), motion=path, ask="bound"),
+        tmp_path / "b", jobs=1,
+    )  # fmt: skip
+    same = ["max_delay_s", "delay_s", "limiting_joint", "worst_instant", "worst_time_s"]
+    pandas.testing.assert_frame_equal(bounds[same], rows[same], check_exact=True)
+    assert bounds["passive"].tolist() == (rows["max_delay_s"] >= rows["delay_s"]).tolist()
+    margins = rows_of(
+        Sweep.of(project, (f"{DELAY}=1,4", f"{HAND}=20,80"), motion=path, ask="margin"),
+        tmp_path / "m", jobs=1,
+    )  # fmt: skip
+    for row in margins.to_dict("records"):
+        found = edited(project, row[HAND], row[DELAY]).local_margins(path)
+        told = {"delay_s": found.delay_s, "jitter_s": found.jitter_s, "time_s": found.time_s}
+        assert {name: row[name] for name in told} == told
+
+
+def test_late_torque_feedback_is_not_shared(project, tmp_path):
+    """A delay that is in the loop itself besides d_1: its answers are computed for each value."""
+    over = (
+        "delays.delayed_torque_feedback=false,true",
+        "delays.embedded_round_trip.value_ms=1,6",
+        f"{DELAY}=4,9",
+    )
+    rows = rows_of(Sweep.of(project, over), tmp_path / "o", jobs=1)
+    alone = [
+        rows_of(
+            Sweep.of(project, [f"{key}={str(row[key]).lower()}" for key in rows.columns[1:4]]),
+            tmp_path / str(row["point"]), jobs=1,
+        ).drop(columns="point").to_dict("records")[0]
+        for row in rows.to_dict("records")
+    ]  # fmt: skip
+    pandas.testing.assert_frame_equal(
+        rows.drop(columns="point"), pandas.DataFrame(alone), check_exact=True, check_dtype=False
+    )
+    assert len(set(rows["local_margin_s"])) == 3
 
 
 def test_margins_and_runs_are_those_of_edited_files(project, tmp_path):
@@ -132,8 +198,8 @@ def test_a_second_run_computes_nothing(project, tmp_path):
     assert sweep.run(tmp_path / "o", jobs=1).computed == 4
     before = content(tmp_path / "o")
     assert sweep.run(tmp_path / "o", jobs=1).computed == 0
-    (tmp_path / "o" / "part-00000002.parquet").unlink()
-    assert sweep.run(tmp_path / "o", jobs=1).computed == 1
+    (tmp_path / "o" / "part-00000001.parquet").unlink()
+    assert sweep.run(tmp_path / "o", jobs=1).computed == 2
     assert content(tmp_path / "o") == before
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
+import sealag
 from helpers.small_systems import arm, arm_system, joint_task
 from sealag.design import load
 from sealag.robot import Contact
@@ -107,7 +108,7 @@ def test_in_the_posture_the_tasks_have_no_error_and_springs_carry_gravity(
 def test_a_run_that_begins_where_the_loop_rests_stays_there(tmp_path, signal):
     system = system_of(tmp_path, signal, GravityCompensation.FEEDBACK)
     rest = system.rest()
-    run = system.simulate(scenario="regulate", duration=0.5)
+    run = sealag.simulate(system, scenario="regulate", duration=0.5)
     assert run.outcome is Outcome.COMPLETED
     np.testing.assert_allclose(run.q, np.tile(rest.q, (len(run.q), 1)), atol=1e-7)
     if signal == "motor":

@@ -1,12 +1,12 @@
 """The command line: options, exit statuses, messages. Commands import what they use."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Unpack
 
 import typer
 
 from sealag.cli._app_gains import sweep, tune
-from sealag.cli._options import Columns, Json, MotionFile, Project, Quaternion
+from sealag.cli._options import Columns, Json, MotionFile, Project, Quaternion, Shown, shown
 from sealag.cli._terminal import show
 from sealag.version import __version__
 
@@ -76,6 +76,7 @@ def init(
 
 
 @app.command()
+@shown
 def certify(
     project: Project,
     motion: MotionFile = None,
@@ -114,28 +115,28 @@ def certify(
             "means.",
         ),
     ] = False,
-    as_json: Json = False,
+    **how: Unpack[Shown],
 ) -> None:
     """Bound the delay at every instant of a motion; status 1 unless passive at it and stable."""
-    from sealag.cli._certify import certify_project
+    from sealag.cli._certify import Reading, certify_project
 
     raise typer.Exit(
         certify_project(
             project,
             motion,
-            columns=columns,
-            quaternion=quaternion,
+            reading=Reading(columns=columns, quaternion=quaternion),
             criterion=criterion,
             time_varying=time_varying,
             proofs=proofs,
             out=out,
             allow_unstable=allow_unstable,
-            as_json=as_json,
+            **how,
         )
     )
 
 
 @app.command()
+@shown
 def margin(
     project: Project,
     motion: MotionFile = None,
@@ -151,7 +152,7 @@ def margin(
             "--rate-sweep", help="Show what each sample rate of the controller tolerates instead."
         ),
     ] = False,
-    as_json: Json = False,
+    **how: Unpack[Shown],
 ) -> None:
     """Compute the exact local delay margin of the frozen closed loop, along a motion."""
     from sealag.cli._commands import margin_project
@@ -163,7 +164,7 @@ def margin(
         quaternion=quaternion,
         horizon_ms=horizon_ms,
         rate_sweep=rate_sweep,
-        as_json=as_json,
+        **how,
     )
 
 
@@ -215,6 +216,7 @@ def verify(
 
 
 @app.command()
+@shown
 def simulate(
     project: Project,
     scenario: Annotated[
@@ -253,7 +255,7 @@ def simulate(
             help="Recording to write; its folder is made if needed. Default: PROJECT.mcap.",
         ),
     ] = None,
-    as_json: Json = False,
+    **how: Unpack[Shown],
 ) -> None:
     """Run the delayed robot, write a recording and its energy audit; status 1 if it falls."""
     from sealag.cli._simulate import simulate_project
@@ -267,7 +269,7 @@ def simulate(
             delay_scale=delay_scale,
             log_ms=log_ms,
             out=out,
-            as_json=as_json,
+            **how,
         )
     )
 

@@ -1,13 +1,14 @@
 """The options of the commands that look for gains: tune and sweep."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Unpack
 
 import typer
 
-from sealag.cli._options import Json, MotionFile, Project
+from sealag.cli._options import Json, MotionFile, Plot, Project, ShownGains, shown
 
 
+@shown
 def tune(
     project: Project,
     motion: MotionFile = None,
@@ -17,7 +18,9 @@ def tune(
             "--aim",
             help="stiffness: the largest; bandwidth: the largest of joint PD, or bandwidth=30 "
             "(rad/s), also with ,damping-ratio=0.7; damping: the least of the motors; drag: the "
-            "least along the motion; shaping: the least beta for the embedded period.",
+            "least along the motion; shaping: the least beta for the embedded period; mapping: "
+            "the controller's damping moved into the drives; optimal: the stiffness with the least "
+            "quadratic index; front: designs that no other one beats.",
         ),
     ] = "stiffness",
     limit: Annotated[
@@ -26,7 +29,8 @@ def tune(
             "--limit",
             help="Transparency to keep: bandwidth=8Hz, the least of the locked joints; rms=5Nm, "
             "the largest of torque against command along the motion; noise=10, the "
-            "largest gain of torque noise by shaping. May be repeated.",
+            "largest gain of torque noise by shaping; error=0.02 and torque=30Nm, which count "
+            "alike in the quadratic index. May be repeated.",
         ),
     ] = None,
     number: Annotated[
@@ -43,10 +47,10 @@ def tune(
         Path | None,
         typer.Option("--write", help="Project file that gets the gains: PROJECT, or one beside."),
     ] = None,
-    as_json: Json = False,
+    **how: Unpack[ShownGains],
 ) -> None:
     """Find gains for a delay and what stops them; status 1 if there are none."""
-    from sealag.cli._tune import tune_project
+    from sealag.cli._tune import Outputs, tune_project
 
     raise typer.Exit(
         tune_project(
@@ -58,8 +62,7 @@ def tune(
             delay_ms=delay_ms,
             safety=safety,
             limits=limit or [],
-            write=write,
-            as_json=as_json,
+            outputs=Outputs(write=write, **how),
         )
     )
 
@@ -77,7 +80,9 @@ def sweep(
     ],
     ask: Annotated[
         str,
-        typer.Option("--ask", help="certify, margin, simulate, tune or tune:aim=…,number=…."),
+        typer.Option(
+            "--ask", help="certify, bound, margin, simulate, tune or tune:aim=…,number=…."
+        ),
     ] = "certify",
     motion: MotionFile = None,
     sample: Annotated[
@@ -105,14 +110,7 @@ def sweep(
             help="Address of a dask cluster to compute on instead, such as tcp://10.0.0.1:8786.",
         ),
     ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(
-            "--plot",
-            help="Picture of it (PNG, SVG, PDF or HTML): a curve, a heat map, or parallel "
-            "coordinates.",
-        ),
-    ] = None,
+    plot: Plot = None,
     as_json: Json = False,
 ) -> None:
     """Ask many designs of a project, one row of a Parquet dataset each."""

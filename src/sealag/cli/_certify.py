@@ -2,10 +2,18 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypedDict
 
 from sealag import design
 from sealag.cli._commands import busy, compile_kernels, note
 from sealag.cli._json import show_json
+from sealag.cli._pictures import (
+    check_picture,
+    drawn,
+    of_certificate,
+    require_motion,
+    show_picture,
+)
 from sealag.cli._terminal import show
 from sealag.errors import InputError
 from sealag.files import Draft, check_output
@@ -27,17 +35,29 @@ def _count(proofs: str) -> int:
     return int(proofs)
 
 
+class Reading(TypedDict):
+    """How a motion's file is read.
+
+    Attributes:
+        columns: names in the file; None for its own.
+        quaternion: order of the base's; None for xyzw.
+    """
+
+    columns: str | None
+    quaternion: str | None
+
+
 def certify_project(
     project: str,
     motion: Path | None,
     *,
-    columns: str | None,
-    quaternion: str | None,
+    reading: Reading,
     criterion: str | None,
     time_varying: bool,
     proofs: str,
     out: Path | None,
     allow_unstable: bool,
+    plot: Path | None,
     as_json: bool,
 ) -> int:
     """Certify, write what the certificate's own check confirms and show the answer.
@@ -50,8 +70,11 @@ def certify_project(
     count = None if proofs == "all" else _count(proofs)
     system = design.load(project)
     path = out or Path(f"{system.name}.certificate.json")
-    check_output(path, *system.files, *([motion] if motion else []))
-    along = system.motion_of(motion, columns=columns, quaternion=quaternion, tell=note)
+    inputs = [*system.files, *([motion] if motion else [])]
+    check_output(path, *inputs)
+    check_picture(plot, path, *inputs)
+    along = system.motion_of(motion, **reading, tell=note)
+    require_motion(plot, len(along))
     system.criterion_asked(along, criterion, time_varying=time_varying, proofs=count)
     with Draft(path) as draft:
         compile_kernels()
@@ -60,11 +83,14 @@ def certify_project(
                 system, along, criterion=criterion, time_varying=time_varying, proofs=count
             ).confirmed()
         certificate.write(draft)
+    if plot is not None:
+        of_certificate(certificate, system.name).write(plot)
     warnings = system.warnings(along)
     if as_json:
-        show_json({**certificate.summary(), "warnings": warnings})
+        show_json({**certificate.summary(), "warnings": warnings, **drawn(plot)})
     else:
         _show_certificate(certificate, path, warnings)
+        show_picture(plot)
     enough = {Status.CERTIFIED, *([Status.PASSIVE_ONLY] if allow_unstable else [])}
     return 0 if certificate.answer.status in enough else 1
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from sealag import design
 from sealag.cli._json import show_json
+from sealag.cli._pictures import check_picture, drawn, of_margins, of_rates, show_picture
 from sealag.cli._terminal import show
 from sealag.errors import CertificateError, FileError, InputError, either
 from sealag.files import check_output, opened, write_text
@@ -107,14 +108,20 @@ def margin_project(
     quaternion: str | None,
     horizon_ms: float | None,
     rate_sweep: bool,
+    plot: Path | None,
     as_json: bool,
 ) -> None:
     """Show the exact local margin at every instant, or at a sample of a long motion."""
     if rate_sweep:
         if any(given is not None for given in (motion, columns, quaternion, horizon_ms)):
             raise InputError("--rate-sweep is of the project's posture: leave out the others.")
-        _sweep_rates(project, as_json=as_json)
+        _sweep_rates(project, plot=plot, as_json=as_json)
         return
+    if plot is not None and horizon_ms is None:
+        raise InputError(
+            "--plot of a margin shows unstable roots against delay, or what sample rates tolerate; "
+            "give --horizon-ms or --rate-sweep."
+        )
     if horizon_ms is not None and not 0.0 < horizon_ms <= LONGEST_HORIZON_MS:
         raise InputError(
             f"--horizon-ms is {horizon_ms:g}; it must be more than 0 and at most "
@@ -122,13 +129,16 @@ def margin_project(
         )
     system = design.load(project)
     horizon = None if horizon_ms is None else seconds_from_ms(horizon_ms)
+    check_picture(plot, *system.files, *([motion] if motion else []))
     along = system.motion_of(motion, columns=columns, quaternion=quaternion, tell=note)
     compile_kernels()
     with busy("computing margins", along):
         found = system.local_margins(along, horizon=horizon)
+    if plot is not None:
+        of_margins(found, system.name).write(plot)
     answer: dict[str, Any] = found.summary()
     if as_json:
-        show_json(answer)
+        show_json({**answer, **drawn(plot)})
         return
     covers = "any passive robot and environment, every delay below it"
     passive = f"{time_text(found.passive_s):12} {covers}"
@@ -155,6 +165,7 @@ def margin_project(
     show(f"{'mode of first crossing':26} {_largest(found.mode)}")
     for low, high, count in found.intervals:
         show(f"{time_text(low):>14} to {time_text(high):14} {count} unstable roots")
+    show_picture(plot)
 
 
 def _largest(shares: Mapping[str, float]) -> str:
@@ -163,18 +174,22 @@ def _largest(shares: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {share:.0%}" for name, share in largest)
 
 
-def _sweep_rates(project: str, *, as_json: bool) -> None:
+def _sweep_rates(project: str, *, plot: Path | None, as_json: bool) -> None:
     """Show what each sample rate tolerates."""
     system = design.load(project)
+    check_picture(plot, *system.files)
     compile_kernels()
-    with busy("lifting sampled loops"):
+    with busy("sampling the loop at each rate"):
         rates = system.rate_sweep()
+    if plot is not None:
+        of_rates(rates, system.name).write(plot)
     if as_json:
-        show_json({"rates": [rate.summary() for rate in rates]})
+        show_json({"rates": [rate.summary() for rate in rates], **drawn(plot)})
         return
     show("rate          largest delay   proven          the design's, without the hold")
     for rate in rates:
-        largest = "not lifted" if rate.largest_s is None else time_text(rate.largest_s)
+        # too many commands wait for the exact loop: only the proven delay is known
+        largest = "not found" if rate.largest_s is None else time_text(rate.largest_s)
         verdict = {True: "stable", False: "unstable", None: "open"}[rate.stable]
         show(
             f"{rate.rate_hz:7.1f} Hz    {largest:15} {time_text(rate.proven_s):15} "
@@ -184,6 +199,7 @@ def _sweep_rates(project: str, *, as_json: bool) -> None:
     kept = [f"{rate.rate_hz:g}" for rate in rates if rate.stable]
     parts = ((lost, "unstable"), (kept, "stable"))
     show("; ".join(f"{', '.join(some)} Hz: {word}" for some, word in parts if some))
+    show_picture(plot)
 
 
 def verify_certificate(

@@ -10,6 +10,7 @@ import numpy as np
 from sealag import design
 from sealag.cli._commands import compile_kernels
 from sealag.cli._json import show_json
+from sealag.cli._pictures import check_picture, drawn, of_run, show_picture
 from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import InputError
@@ -34,6 +35,7 @@ def simulate_project(
     delay_scale: float,
     log_ms: float | None,
     out: Path | None,
+    plot: Path | None,
     as_json: bool,
 ) -> int:
     """Run a scenario with a progress bar, write the recording and show the audit.
@@ -44,6 +46,7 @@ def simulate_project(
     system = design.load(project)
     path = out or Path(f"{system.name}.mcap")
     check_output(path, *system.files)
+    check_picture(plot, path, *system.files)
     length = system.duration(scenario) if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"--duration is {length}; a positive time in s is needed.")
@@ -72,14 +75,17 @@ def simulate_project(
             ),
         )
         saved = _record(run, system, draft)
+    if plot is not None:
+        of_run(run, system.name).write(plot)
     answer = run.summary(recording=saved)
     kind = system.simulation.scenario if scenario is None else scenario
     if kind == "walk":
         answer |= gait_summary(system, run)
     if as_json:
-        show_json(answer)
+        show_json({**answer, **drawn(plot)})
     else:
         _show(run, answer, kind)
+        show_picture(plot)
     if run.outcome is Outcome.INTERRUPTED:
         raise KeyboardInterrupt
     return 0 if run.outcome is Outcome.COMPLETED else 1

@@ -9,8 +9,8 @@ from typing import Any
 
 from sealag.cli._commands import compile_kernels, note
 from sealag.cli._json import show_json
+from sealag.cli._pictures import check_picture
 from sealag.cli._terminal import show
-from sealag.files import check_output
 from sealag.sweep import Sweep
 
 _PATIENCE = 10.0  # s between two lines of progress where there is no terminal
@@ -35,8 +35,7 @@ def sweep_project(
     sweep = Sweep.of(project, over, tell=note, **asked)
     folder = out or Path(f"{sweep.system.name}.sweep")
     if plot is not None:
-        check_output(plot, *sweep.system.files)
-        sweep.check_plot(plot)
+        check_picture(plot, *sweep.system.files)
     compile_kernels()
     with _progress(sweep.sample.points) as progress:
         found = sweep.run(folder, jobs=jobs, scheduler=scheduler, progress=progress)

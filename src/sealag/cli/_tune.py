@@ -1,11 +1,12 @@
 """`sealag tune`: gains for a delay, what stops them, and the project file that has them."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from sealag import design
 from sealag.cli._commands import busy, compile_kernels
 from sealag.cli._json import show_json
+from sealag.cli._pictures import check_picture, drawn, of_gains, show_picture
 from sealag.cli._terminal import show
 from sealag.design import System
 from sealag.errors import FileError, InputError
@@ -22,8 +23,26 @@ _PROMISES = {
 """What holds for gains that reach the required delay by a number."""
 _GOALS = {"bandwidth": "bandwidth", "damping-ratio": "damping_ratio"}
 """Names in --aim, and what `tune` calls them."""
-_UNITS = {"bandwidth": "Hz", "rms": "Nm", "noise": ""}
+_UNITS = {"bandwidth": "Hz", "rms": "Nm", "noise": "", "error": "", "torque": "Nm"}
 """Unit of each limit."""
+
+
+class Outputs(TypedDict):
+    """What becomes of the answer.
+
+    Attributes:
+        write: project file that gets the gains; None for none.
+        pick: number of the front's point that counts; None for none.
+        plot: picture; None for none.
+        allow_unstable: whether passive gains count that hold no equilibrium.
+        as_json: whether one JSON object is all that is printed.
+    """
+
+    write: Path | None
+    pick: int | None
+    plot: Path | None
+    allow_unstable: bool
+    as_json: bool
 
 
 def tune_project(
@@ -33,8 +52,7 @@ def tune_project(
     aim: str,
     limits: list[str],
     delay_ms: float | None,
-    write: Path | None,
-    as_json: bool,
+    outputs: Outputs,
     **asked: Any,
 ) -> int:
     """Find gains, write them if that is asked for, and show them.
@@ -46,22 +64,36 @@ def tune_project(
     allowed = dict(_limit(text) for text in limits)
     if len(allowed) < len(limits):
         raise InputError("--limit gives one quantity twice; give each once.")
+    write, plot, pick = outputs["write"], outputs["plot"], outputs["pick"]
+    if pick is not None and word != "front":
+        raise InputError("--pick chooses a point of a front; ask for it with --aim front.")
+    if word == "front" and write is not None and pick is None:
+        raise InputError("A front has many designs; choose which to write with --pick NUMBER.")
     system = design.load(project)
     delay = None if delay_ms is None else seconds_from_ms(delay_ms)
     if write is not None:
         _check_target(write, system, motion, delay)
+    check_picture(plot, *system.files, *([motion] if motion else []))
     along = system.motion_of(motion)
     compile_kernels()
     with busy("tuning", along):
         tuned = tune(system, along, aim=word, limits=allowed, delay=delay, **goals, **asked)
-    written = write if tuned.found else None
+        if pick is not None and tuned.front:
+            tuned = tuned.pick(pick)
+        good = tuned.found or (outputs["allow_unstable"] and tuned.passive_only)
+        plot = plot if good else None
+        if plot is not None:
+            of_gains(tuned).write(plot)
+    written = write if good else None
     if written is not None:
         write_text(written, tuned.system.text)
-    if as_json:
-        show_json({**tuned.summary(), "written": None if written is None else str(written)})
+    if outputs["as_json"]:
+        names = {"written": None if written is None else str(written)}
+        show_json({**tuned.summary(), **names, **drawn(plot)})
     else:
-        _show(tuned, written)
-    return 0 if tuned.found else 1
+        _show(tuned, written, good=good)
+        show_picture(plot)
+    return 0 if good else 1
 
 
 def _aim(aim: str) -> tuple[str, dict[str, float]]:
@@ -75,7 +107,8 @@ def _aim(aim: str) -> tuple[str, dict[str, float]]:
         return word, {}
     if word != "bandwidth" or not set(goals) <= set(_GOALS.values()) or None in goals.values():
         raise InputError(
-            f"--aim is {aim!r}; it must be one of stiffness, damping, drag, shaping, bandwidth or "
+            f"--aim is {aim!r}; it must be one of stiffness, damping, drag, shaping, mapping, "
+            "optimal, front, bandwidth or "
             "bandwidth=NUMBER "
             "(rad/s); damping-ratio=NUMBER may follow bandwidth behind a comma."
         )
@@ -88,8 +121,8 @@ def _limit(text: str) -> tuple[str, float]:
     value = number_of(number.removesuffix(_UNITS.get(name, "")).strip())
     if name not in _UNITS or value is None:
         raise InputError(
-            f"--limit is {text!r}; it must be bandwidth=NUMBER (Hz), rms=NUMBER (Nm) or "
-            "noise=NUMBER."
+            f"--limit is {text!r}; it must be bandwidth=NUMBER (Hz), rms=NUMBER (Nm), "
+            "noise=NUMBER, error=NUMBER (m or rad) or torque=NUMBER (Nm)."
         )
     return name, value
 
@@ -115,12 +148,12 @@ def _check_target(path: Path, system: System, motion: Path | None, delay: float 
         )
 
 
-def _show(tuned: Any, path: Path | None) -> None:
+def _show(tuned: Any, path: Path | None, *, good: bool) -> None:
     """Show gains, what stops them and by how much."""
     question, binding = tuned.question, tuned.binding
     rows = [
         (
-            "tuned" if tuned.found else "not tuned",
+            "tuned" if good else "not tuned",
             f"{question.aim} for the {question.number} number",
         ),
         ("delay of the design", time_text(question.system.delays.d_1)),
@@ -135,13 +168,14 @@ def _show(tuned: Any, path: Path | None) -> None:
         rows += [(f"  factor of {name}", f"{value:.6g}") for name, value in tuned.factors.items()]
     if binding is not None:
         rows += [(name, _gain(value)) for name, value in tuned.gains().items()]
-    if tuned.found:
+    if good:
         rows.append(("promised", _PROMISES[question.number]))
         rows += _transparency(tuned)
     if tuned.certificate is not None:
         status = tuned.certificate.answer.status.value.replace("_", " ")
         asked = "" if question.number == "passive" else " (of the passive number, not asked for)"
         rows.append(("certificate", status + asked))
+    rows += _findings(tuned)
     if binding is not None:
         shares = sorted(binding.joints.items(), key=lambda item: -item[1])[:_SHARES_SHOWN]
         joints = ", ".join(f"{name} {share:.0%}" for name, share in shares if share >= 0.01)
@@ -155,10 +189,40 @@ def _show(tuned: Any, path: Path | None) -> None:
         rows.append(("worst instant", f"{binding.instant}, at {binding.time_s:.3f} s"))
     if path is not None:
         rows.append(("written", str(path)))
+    if tuned.front and binding is None:
+        _show_front(tuned)
+        return
     for name, value in rows:
         show(f"{name:26} {value}")
     for reason in tuned.reasons:
-        show(f"not tuned because {reason}")
+        show(f"{'passive only' if good else 'not tuned'} because {reason}")
+
+
+def _findings(tuned: Any) -> list[tuple[str, str]]:
+    """What a mapping of damping leaves, and what a quadratic index could be."""
+    rows, mapping, index = [], tuned.mapping, tuned.index
+    if mapping is not None:
+        error = f"{mapping.error:.2%} of the controller's damping, at most {mapping.worst:.2%}"
+        rows.append(("left over", f"{error} at instant {mapping.instant}"))
+        for name, value in mapping.jitter_s.items():
+            rows.append((f"  jitter margin, {name}", time_text(value)))
+    if index is not None:
+        rows.append(("quadratic index", f"{index.value:.6g} s"))
+        rows.append(("  without delay", f"{index.free:.6g} s"))
+        rows.append(("  of any controller", f"{index.least:.6g} s at least, without delay"))
+    return rows
+
+
+def _show_front(tuned: Any) -> None:
+    """Show the points of a front, one a line."""
+    cost = "drag, J" if tuned.question.moves else "trace D, Nms/rad"
+    show(f"{'number':>6} {'delay':>12} {'stiffness':>10} {cost:>17} {'bandwidth':>11}")
+    for point in tuned.front:
+        show(
+            f"{point.number:6} {time_text(point.delay_s):>12} {point.scale:10.4g} "
+            f"{point.cost:17.5g} {point.bandwidth_hz:8.4g} Hz"
+        )
+    show("--pick NUMBER certifies one of them, --write FILE writes it")
 
 
 def _transparency(tuned: Any) -> list[tuple[str, str]]:
@@ -166,7 +230,7 @@ def _transparency(tuned: Any) -> list[tuple[str, str]]:
     shown = tuned.summary()["transparency"]
     rows = []
     for name, limit in tuned.question.limits.items():
-        if name == "noise":  # its gain follows from the shaping
+        if name not in ("bandwidth", "rms"):
             continue
         unit, least = _UNITS[name], name == "bandwidth"
         values = shown[f"{name}_{unit.lower()}"]

@@ -3,7 +3,7 @@
 from sealag.design._certify import certify
 from sealag.design._project import load
 from sealag.design._recheck import verify_design
-from sealag.design._run import simulate
+from sealag.design._simulate import simulate
 from sealag.design._starter import starter_project
 from sealag.design._system import System
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sealag.design._design import Design
 from sealag.design._local import Local
-from sealag.design._system import System
 from sealag.passivity import Assumption, Basis, Criterion
 from sealag.robot import Motion
 from sealag.units import time_text
@@ -13,7 +13,7 @@ from sealag.whole_body import GravityCompensation, Tank, TaskError
 
 
 def assumptions_of(
-    system: System, motion: Motion, criterion: Criterion, local: Local
+    system: Design, motion: Motion, criterion: Criterion, local: Local
 ) -> tuple[Assumption, ...]:
     """Return the assumptions of a design's certificate.
 
@@ -32,7 +32,7 @@ def assumptions_of(
 
 
 def _of_the_proof(
-    system: System, motion: Motion, criterion: Criterion
+    system: Design, motion: Motion, criterion: Criterion
 ) -> Iterator[tuple[str, str]]:
     yield (
         "frozen_coefficients",
@@ -72,7 +72,7 @@ def _of_stability(motion: Motion, local: Local) -> Iterator[tuple[str, str]]:
         yield "critical_instant", f"At the critical instant {local.problem.rstrip('.')}."
 
 
-def _of_delays(system: System) -> Iterator[tuple[str, str]]:
+def _of_delays(system: Design) -> Iterator[tuple[str, str]]:
     delays = system.delays
     yield (
         "delay_bound",
@@ -110,7 +110,7 @@ def _of_delays(system: System) -> Iterator[tuple[str, str]]:
         )
 
 
-def _of_the_law(system: System) -> Iterator[tuple[str, str]]:
+def _of_the_law(system: Design) -> Iterator[tuple[str, str]]:
     law = system.law
     if law.gravity is GravityCompensation.PLANNED:
         yield (
@@ -144,7 +144,7 @@ def _of_the_law(system: System) -> Iterator[tuple[str, str]]:
         )
 
 
-def _of_drives(system: System) -> Iterator[tuple[str, str]]:
+def _of_drives(system: Design) -> Iterator[tuple[str, str]]:
     drives, robot = system.actuators, system.robot
     limited = np.isfinite(drives.torque_limit)
     if limited.any():
@@ -193,7 +193,7 @@ def _of_drives(system: System) -> Iterator[tuple[str, str]]:
         yield "urdf_limit_zero", f"The URDF gives an effort or velocity limit of 0 for {names}."
 
 
-def _of_contacts(system: System) -> Iterator[tuple[str, str]]:
+def _of_contacts(system: Design) -> Iterator[tuple[str, str]]:
     if system.contacts:
         yield "contacts", "Contacts neither slip nor lift off."
     yield (

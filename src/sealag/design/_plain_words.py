@@ -1,7 +1,11 @@
 """What the schema finds wrong with a project file, in plain words."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from sealag.errors import FileError, ProjectError, SealagError
 
 _NEEDS = {
     "bool_type": "it must be true or false",
@@ -84,3 +88,22 @@ def _key(place: tuple[Any, ...], data: Any) -> str:
             name = at.get("name", at.get("frame")) if isinstance(at, dict) else None
             key += f" (entry {part + 1})" if name is None else f"[{name!r}]"
     return key.removeprefix(".")
+
+
+@contextmanager
+def named(path: Path, key: str) -> Iterator[None]:
+    """Let errors name the project file and the key that they come from, unless they do so.
+
+    Args:
+        path: the file.
+        key: the key; empty if none is at fault.
+    """
+    try:
+        yield
+    except SealagError as error:
+        if str(error).startswith((f"{path}: ", f"{path} ")):
+            error.at(path, key)
+            raise
+        kind = FileError if isinstance(error, FileError) else ProjectError
+        named = kind(f"{path}: {key}{': ' if key else ''}{error}").at(path, key)
+        raise named from error

@@ -3,7 +3,6 @@
 import math
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,18 +10,10 @@ from typing import Any
 import numpy as np
 
 from sealag.actuation import Actuators
-from sealag.delay import (
-    Constant,
-    Delays,
-    Link,
-    PacketOrder,
-    RoundTrip,
-    Sinusoid,
-    Table,
-)
+from sealag.design._delays import delays_of
 from sealag.design._design import Source
 from sealag.design._matrices import matrices_of
-from sealag.design._plain_words import first_problem
+from sealag.design._plain_words import first_problem, named
 from sealag.design._program import program_of
 from sealag.design._schema import (
     AXES,
@@ -35,12 +26,11 @@ from sealag.design._schema import (
 )
 from sealag.design._system import System
 from sealag.design._walking import walking_of
-from sealag.errors import FileError, InputError, ProjectError, SealagError
+from sealag.errors import FileError, InputError, ProjectError
 from sealag.files import bundled, read_whole
 from sealag.passivity import Criterion
 from sealag.robot import Contact, ContactKind, Robot, load_robot
 from sealag.typing import Array
-from sealag.units import number_of
 from sealag.whole_body import (
     GravityCompensation,
     Law,
@@ -55,17 +45,18 @@ from sealag.whole_body import (
 )
 
 LARGEST_PROJECT_BYTES = 1_000_000
-LARGEST_SAMPLES_BYTES = 50_000_000
 _TOO_LARGE = "has too many digits; TOML's whole numbers have at most 19"
 _REQUIRED = ("spring_stiffness", "rotor_inertia", "motor_damping", "inertia_shaping")
 
 
-def load(path: str | Path, *, text: str | None = None) -> System:
+def load(path: str | Path, *, text: str | None = None, beside: System | None = None) -> System:
     """Read a project file.
 
     Args:
         path: TOML file, or `bundled:hume`; relative paths in it start at its folder.
         text: what the file is to say, before it does so; its own text if None.
+        beside: a design of the same file with another text, whose robot serves once more where it
+            is the same; the files that the text names have not changed since.
 
     Returns:
         The system.
@@ -78,9 +69,9 @@ def load(path: str | Path, *, text: str | None = None) -> System:
     path = _resolved(path)
     content = read_whole(path, what="The project file", largest=LARGEST_PROJECT_BYTES)
     content = content if text is None else text.encode()
-    with _named(path, ""):
+    with named(path, ""):
         project = _parsed(content, path)
-        return _system(project, path, content.decode("utf-8-sig"))
+        return _system(project, path, content.decode("utf-8-sig"), beside)
 
 
 def loaded(project: System | str | Path) -> System:
@@ -143,29 +134,9 @@ def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
         yield key, value
 
 
-@contextmanager
-def _named(path: Path, key: str) -> Iterator[None]:
-    """Let errors name the project file and the key that they come from, unless they do so."""
-    try:
-        yield
-    except SealagError as error:
-        if str(error).startswith((f"{path}: ", f"{path} ")):
-            error.at(path, key)
-            raise
-        kind = FileError if isinstance(error, FileError) else ProjectError
-        named = kind(f"{path}: {key}{': ' if key else ''}{error}").at(path, key)
-        raise named from error
-
-
-def _system(project: Project, path: Path, text: str) -> System:
+def _system(project: Project, path: Path, text: str, beside: System | None) -> System:
     folder = path.parent
-    with _named(path, "robot"):
-        robot = load_robot(
-            project.robot.urdf,
-            floating_base=project.robot.base == "floating",
-            actuated=project.robot.actuated,
-            relative_to=folder,
-        )
+    robot = _robot(project, path, beside)
     law = _law(project, robot, path)
     law.gain(robot)
     actuators = _actuators(project.actuators, robot, path)
@@ -176,13 +147,13 @@ def _system(project: Project, path: Path, text: str) -> System:
     match project.controller:
         case ProgramKeys() as keys:
             program_file = folder / keys.file
-            with _named(path, "controller.file"):
+            with named(path, "controller.file"):
                 program = program_of(program_file, keys.function)
         case MatrixKeys() as keys:
             program_file = folder / keys.file if keys.file is not None else None
-            with _named(path, "controller"):
+            with named(path, "controller"):
                 program = matrices_of(keys, robot, folder, project.delays.sample_time_ms * 1e-3)
-    with _named(path, "simulation.pushes"):
+    with named(path, "simulation.pushes"):
         for push in project.simulation.pushes:
             robot.check_frame(push.frame)
     motion_file = None
@@ -203,7 +174,7 @@ def _system(project: Project, path: Path, text: str) -> System:
         contacts=_contacts(project.contacts, robot, path),
         posture=_posture(project.posture, robot, path),
         criterion=_criterion(project.controller),
-        delays=_delays(project.delays, folder, path),
+        delays=delays_of(project.delays, folder, path),
         simulation=project.simulation,
         walking=walking_of(project.walking, robot),
         source=Source(
@@ -213,6 +184,19 @@ def _system(project: Project, path: Path, text: str) -> System:
             motion_file=motion_file,
         ),
     )
+
+
+def _robot(project: Project, path: Path, beside: System | None) -> Robot:
+    known = None if beside is None else beside.source
+    if beside and known and (known.files[0], known.project.robot) == (path, project.robot):
+        return beside.robot
+    with named(path, "robot"):
+        return load_robot(
+            project.robot.urdf,
+            floating_base=project.robot.base == "floating",
+            actuated=project.robot.actuated,
+            relative_to=path.parent,
+        )
 
 
 def _law(project: Project, robot: Robot, path: Path) -> Law:
@@ -259,7 +243,7 @@ def _by_joint(given: float | dict[str, float], robot: Robot, path: Path, key: st
     """One number for all joints, or a table with one for each (n,)."""
     if not isinstance(given, dict):
         return np.full(robot.n, float(given))
-    with _named(path, key):
+    with named(path, key):
         for name in given:
             robot.joint_index(name)
     missing = [name for name in robot.joints if name not in given]
@@ -314,7 +298,7 @@ def _posture(section: Any, robot: Robot, path: Path) -> Array:
             f"{path}: posture.base_quaternion_xyzw has length {length:.4g}; 1 is right, in the "
             "order x, y, z, w."
         )
-    with _named(path, "posture.joints"):
+    with named(path, "posture.joints"):
         q = robot.configuration(
             section.joints,
             base_position=section.base_position,
@@ -371,76 +355,3 @@ def _left_out(key: str) -> float:
     if key in ("torque_limit", "velocity_limit", "coulomb_friction"):
         return math.nan
     return math.inf if key == "torque_bandwidth" else 0.0
-
-
-def _delays(section: Any, folder: Path, path: Path) -> Delays:
-    return Delays(
-        central=_connection(section, "central", folder, path),
-        embedded=_connection(section, "embedded", folder, path),
-        sample_time=section.sample_time_ms * 1e-3,
-        embedded_period=section.embedded_period_ms * 1e-3,
-        delayed_torque_feedback=section.delayed_torque_feedback,
-    )
-
-
-def _connection(section: Any, name: str, folder: Path, path: Path) -> RoundTrip:
-    """A connection from its round trip, or from both of its ways."""
-    sections = {way: getattr(section, f"{name}_{way}") for way in ("round_trip", "up", "down")}
-    given = {way for way, keys in sections.items() if keys is not None}
-    if given not in ({"round_trip"}, {"up", "down"}):
-        said = "given besides one of its ways" if "round_trip" in given else "missing"
-        raise ProjectError(
-            f"{path}: the key delays.{name}_round_trip is {said}; give it alone, or both {name}_up "
-            f"and {name}_down."
-        )
-    links = {}
-    for way in given:
-        with _named(path, f"delays.{name}_{way}"):
-            links[way] = Link(delay=_signal(sections[way], folder), **_packets(sections[way]))
-    if "round_trip" not in links:
-        return RoundTrip(**links)
-    whole = sections["round_trip"]
-    return RoundTrip.halved(links["round_trip"].delay, **_packets(whole))
-
-
-def _packets(keys: Any) -> dict[str, Any]:
-    return {
-        "jitter": keys.jitter_ms * 1e-3,
-        "loss": keys.packet_loss,
-        "max_burst": keys.max_burst,
-        "order": PacketOrder(keys.order),
-    }
-
-
-def _signal(section: Any, folder: Path) -> Constant | Sinusoid | Table:
-    match section.kind:
-        case "constant":
-            return Constant(section.value_ms * 1e-3)
-        case "sinusoid":
-            return Sinusoid(
-                mean=section.mean_ms * 1e-3,
-                amplitude=section.amplitude_ms * 1e-3,
-                angular_frequency=section.angular_frequency_rad_s,
-                phase=section.phase_rad,
-            )
-        case "table":
-            return Table(time=np.asarray(section.time_s), delay=np.asarray(section.delay_ms) * 1e-3)
-        case _:
-            return _samples(section, folder)
-
-
-def _samples(section: Any, folder: Path) -> Table:
-    """Measured delays: one number (ms) a line."""
-    path = folder / section.file
-    content = read_whole(path, what="The delay samples", largest=LARGEST_SAMPLES_BYTES)
-    values = []
-    for row, line in enumerate(content.decode("utf-8-sig", "replace").splitlines(), start=1):
-        value = number_of(line)
-        if value is None and line.strip():
-            raise ProjectError(f"{path}: line {row} is no number; one delay in ms a line is right.")
-        values += [] if value is None else [value]
-    if not values:
-        raise ProjectError(f"{path} is empty; one delay in ms a line is needed.")
-    return Table.measured(
-        np.array(values) * 1e-3, period=section.period_s, quantile=section.quantile
-    )

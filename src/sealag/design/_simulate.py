@@ -1,14 +1,17 @@
-"""A design in the simulator: regulate, track, drop and balance."""
+"""`sealag.simulate`: a design, or its project file, in the simulator."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sealag.design._design import Design
+from sealag.design._project import loaded
 from sealag.design._schema import SCENARIOS
+from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.robot import ContactKind
 from sealag.simulation import Clock, Foot, Network, Push, Run, Scene, closed_loop
@@ -31,8 +34,8 @@ FINER = 4
 _SPOT_SPEED = 1e-3  # m/s
 
 
-def run_design(
-    system: Design,
+def simulate(
+    project: System | str | Path,
     *,
     scenario: str | None = None,
     duration: float | None = None,
@@ -41,17 +44,35 @@ def run_design(
     log_period: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Run a design as `sealag.simulate` says it.
+    """Run a design's whole-body controller on the delayed robot, with contacts and energy audit.
+
+    Scenarios: `regulate` holds the posture while the project's pushes act; `balance` does so with
+    a push of 5 % of the weight for 0.1 s if the project has none, or, if the project has a
+    [walking] section, by stepping on the spot on flat ground, since a biped on point feet cannot
+    stand; `track` moves the first task's first row as a sinusoid; `drop` begins above the ground,
+    or, with a fixed base, with springs that do not yet carry the joints; `walk` takes the steps of
+    the project's [walking] section.
 
     Args:
-        system: the design.
-        scenario: what happens.
-        duration: s.
-        seed: of jitter and losses.
+        project: the design, or its project file.
+        scenario: one of the five; the project's if None.
+        duration: s; the project's, or the walk's, if None.
+        seed: of jitter and losses; the project's if None.
         delay_scale: factor on both round trips.
-        log_period: time between two logged instants, s.
+        log_period: time between two logged instants, s; the project's, or the controller's period,
+            if None.
         progress: called with the simulated time.
+
+    Returns:
+        The run; a fall or divergence is its named outcome.
+
+    Raises:
+        InputError: the scenario is unknown, duration, seed or delay_scale cannot be, the recording
+            would not fit into the temporary folder, a push does not act during the run, a foot
+            begins inside the ground, or the torque limits cannot hold the posture.
+        FileError: the project file cannot be read.
     """
+    system = loaded(project)
     setting = system.simulation
     kind = setting.scenario if scenario is None else scenario
     if kind not in SCENARIOS:

@@ -4,18 +4,18 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from sealag.design._along import Along
 from sealag.design._criteria import certified_bounds
 from sealag.design._design import Design
+from sealag.design._findings import Findings
 from sealag.design._local import Local, local_of
 from sealag.design._margins import LocalMargins, local_margins
 from sealag.design._motion_file import load_motion, motion_of_run, save_motion
 from sealag.design._rates import RATES, Rate, rate_sweep
 from sealag.design._standing import standing_warnings
 from sealag.errors import InputError, either
-from sealag.passivity import Bound, Criterion
+from sealag.passivity import Bound, Criterion, Solver
 from sealag.robot import Motion
 from sealag.simulation import Run
 from sealag.typing import Array
@@ -259,8 +259,32 @@ class System(Design):
             )
         return Criterion(name)
 
-    def simulate(self, **choices: Any) -> Run:
-        """Run the controller on the delayed robot; see `sealag.simulate` for the choices."""
-        from sealag.design._simulate import run_design
+    def findings(
+        self,
+        motion: Motion | Run | str | Path | None = None,
+        criterion: Criterion | str | None = None,
+        *,
+        time_varying: bool = False,
+        proofs: int | None = PROOF_COUNT,
+        solver: Solver | None = None,
+    ) -> Findings:
+        """Compute all that certificates of the design along a motion rest on.
 
-        return run_design(self, **choices)
+        `findings().certificate()` is what `sealag.certify` returns; `findings().confirmed(delays)`
+        gives, in milliseconds, what it and its check come to for the design with other delays.
+
+        Args:
+            motion: as `sealag.certify` takes it; so the others.
+            criterion: which one.
+            time_varying: whether a bound for matrices that move is asked for.
+            proofs: how many instants with their numbers; None for all.
+            solver: where multipliers come from.
+
+        Raises:
+            InputError: as `certify` raises it; so the others.
+        """
+        along = self.motion_of(motion)
+        kind = self.criterion_asked(along, criterion, time_varying=time_varying, proofs=proofs)
+        return Findings.of(
+            self, along, kind=kind, time_varying=time_varying, proofs=proofs, solver=solver
+        )

@@ -165,12 +165,16 @@ class Certificate(Stated):
             proof=self.evidence.proof_of(critical),
         )
 
-    def confirmed(self) -> Self:
+    def confirmed(self, *, proven: bool = False) -> Self:
         """Return what the verifier confirms of this certificate, before anybody else asks it.
 
         Where only the frozen loop's checks fail, as at roots that rounding leaves on the axis, the
         claims of stability and local margin are withdrawn: the design is at most passive only, and
         `reasons` says what could not be confirmed.
+
+        Args:
+            proven: whether proofs and frozen loop are those of a certificate that was confirmed for
+                another delay: they hold at any, and only the claims are checked.
 
         Returns:
             This certificate if all its checks hold; else the one with the lower claim.
@@ -178,6 +182,8 @@ class Certificate(Stated):
         Raises:
             SolverError: something else could not be confirmed, so that nothing can be claimed.
         """
+        if proven and all(check.ok for check in claim_checks(self._sealed())):
+            return self
         found = self._refused()
         if not found:
             return self
@@ -190,13 +196,14 @@ class Certificate(Stated):
             )
         return lower
 
+    def _sealed(self) -> Self:
+        """The same as a file would say it, which has a digest."""
+        hashes = {**self.question.hashes, "content": _NO_DIGEST}
+        return replace(self, question=replace(self.question, hashes=hashes))
+
     def _refused(self) -> list[Check]:
         """Checks that fail in doubles; what they leave in doubt is decided in rationals."""
-        question = self.question
-        sealed = replace(
-            self,
-            question=replace(question, hashes={**question.hashes, "content": _NO_DIGEST}),
-        )
+        sealed = self._sealed()
         found = [check for check in sealed.checks() if not check.ok]
         return [check for check in sealed.checks(exact=True) if not check.ok] if found else []
 

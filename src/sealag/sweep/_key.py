@@ -1,7 +1,7 @@
 """The dotted path of a value in a project file."""
 
 import re
-from collections.abc import MutableMapping
+from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,17 +68,21 @@ class Key:
             found.append(step)
         return tuple(found)
 
-    def put(self, document: Any, value: Any) -> None:
+    @property
+    def table(self) -> str:
+        """The table of the file that it stands in."""
+        return self.parts[0]
+
+    @staticmethod
+    def put(document: Any, place: Sequence[str | int], value: Any) -> None:
         """Write a value; tables that are not there are made.
 
         Args:
             document: a document of TOML Kit.
+            place: where, as `place` returns it.
             value: a number, a truth value or a word.
-
-        Raises:
-            InputError: as `place` raises it.
         """
-        *tables, last = self.place(document)
+        *tables, last = place
         at = document
         for step in tables:
             if isinstance(at, MutableMapping) and step not in at:

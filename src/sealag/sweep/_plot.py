@@ -1,6 +1,5 @@
 """A picture of a sweep: a curve, a heat map, or parallel coordinates."""
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,15 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from sealag.errors import InputError, either
-from sealag.files import written_whole
+from sealag.picture import blank, save
 from sealag.sweep._axis import Axis, Choices, Spacing
 from sealag.sweep._dataset import Dataset
 from sealag.sweep._question import Question
 from sealag.sweep._sample import Kind, Sample
 from sealag.typing import Array
 
-FORMATS = ("png", "svg", "pdf", "html")
 _MOST_LINES = 2000
 """Lines of parallel coordinates; more are one dark surface."""
 _COLOURS = "viridis"
@@ -65,21 +62,6 @@ class _Points:
     good: Array
 
 
-def ending_of(path: Path) -> str:
-    """Return a picture's format.
-
-    Args:
-        path: the file.
-
-    Raises:
-        InputError: its ending is none of the formats'.
-    """
-    ending = path.suffix.removeprefix(".").lower()
-    if ending not in FORMATS:
-        raise InputError(f"--plot is {str(path)!r}; its ending must be {either(FORMATS)}.")
-    return ending
-
-
 def draw(dataset: Dataset, sample: Sample, question: Question, path: Path) -> None:
     """Draw a dataset into a file.
 
@@ -93,13 +75,8 @@ def draw(dataset: Dataset, sample: Sample, question: Question, path: Path) -> No
         InputError: the file's ending is none of the formats'.
         FileError: the file cannot be written.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    ending = ending_of(path)
     points = _points(dataset, sample, question)
-    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
-    at = figure.add_subplot()
+    figure, at = blank()
     name = _HEADLINES[question.headline]
     match len(points.axes):
         case 1:
@@ -108,18 +85,7 @@ def draw(dataset: Dataset, sample: Sample, question: Question, path: Path) -> No
             _map(figure, at, points, name, grid=sample.kind is Kind.GRID)
         case _:
             _parallel(figure, at, points, name)
-    kind = "svg" if ending == "html" else ending
-    drawn = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": dataset.fingerprint, "svg.fonttype": "none"}):
-        date = {} if kind == "png" else {"CreationDate" if kind == "pdf" else "Date": None}
-        figure.savefig(drawn, format=kind, metadata=date, dpi=150)
-    content = drawn.getvalue()
-    if ending == "html":
-        picture = content[content.index(b"<svg") :]
-        head = b'<!doctype html><html lang="en"><meta charset="utf-8"><title>sealag sweep</title>'
-        content = head + b"<body>" + picture + b"</body></html>\n"
-    with written_whole(path) as file:
-        file.write(content)
+    save(figure, path, title=f"sealag sweep {dataset.fingerprint}")
 
 
 def _points(dataset: Dataset, sample: Sample, question: Question) -> _Points:

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from sealag.design import System, certify, simulate
+from sealag.design import System, simulate
 from sealag.errors import InputError, either, word
+from sealag.passivity import Answer
+from sealag.robot import Motion
 from sealag.simulation import Outcome, Run
 from sealag.tune import tune
 from sealag.units import number_of
@@ -20,10 +22,15 @@ _TUNE = ("aim", "number", "share", "safety", "damping_ratio")
 _TUNE_NUMBERS = ("safety", "damping_ratio")
 
 
+ToDelays = Callable[[System], dict[str, Any]]
+
+
 class Ask(StrEnum):
-    """The command whose answer every point has."""
+    """The command whose answer every point has; the bound is the part of `certify` that has a
+    closed form."""
 
     CERTIFY = "certify"
+    BOUND = "bound"
     MARGIN = "margin"
     TUNE = "tune"
     SIMULATE = "simulate"
@@ -43,7 +50,7 @@ class Question:
 
     @classmethod
     def of(cls, text: str) -> "Question":
-        """Read certify, margin, simulate, tune, or tune:aim=damping,number=jitter.
+        """Read certify, bound, margin, simulate, tune, or tune:aim=damping,number=jitter.
 
         Args:
             text: the expression.
@@ -80,7 +87,7 @@ class Question:
         Raises:
             InputError: as the command would.
         """
-        if self.ask in (Ask.CERTIFY, Ask.TUNE):
+        if self.ask in (Ask.CERTIFY, Ask.BOUND, Ask.TUNE):
             system.require_law("Bounds and tuned gains are")
         if self.ask is Ask.SIMULATE:
             system.duration()
@@ -100,33 +107,47 @@ class Question:
         """The column whose words are counted."""
         return _VERDICTS[self.ask]
 
-    def answer(self, system: System, motion: Path | None) -> dict[str, Any]:
-        """Ask a design.
+    @property
+    def of_motions(self) -> bool:
+        """Whether it is asked along a motion."""
+        return self.ask is not Ask.SIMULATE
+
+    @property
+    def spans_delays(self) -> bool:
+        """Whether what is prepared for a law serves it with other delays too."""
+        return self.ask in (Ask.CERTIFY, Ask.BOUND, Ask.MARGIN)
+
+    def prepared(self, system: System, along: Motion | None) -> ToDelays:
+        """Compute what an answer rests on besides the delays of both connections.
 
         Args:
             system: the design.
-            motion: a motion's file, or None.
+            along: a motion; None for the posture.
 
         Returns:
-            By column; a time that no delay reaches is inf, what is not known None.
+            A function of the design, or of one with other delays if the question `spans_delays`: an
+            answer by column; a time that no delay reaches is inf, what is not known None.
 
         Raises:
-            SealagError: the command would refuse it.
+            SealagError: the command would refuse it; so the function.
         """
-        if self.ask is Ask.SIMULATE:
-            return _run(system)
-        along = None
-        if motion is not None or system.motion_file is not None:
-            along = system.motion_of(motion, tell=_nothing)
-        return _ANSWERS[self.ask](system, along, self.options)
+        match self.ask:
+            case Ask.CERTIFY:
+                findings = system.findings(along)
+                return lambda system: _certified(system, findings.confirmed(system.delays).answer)
+            case Ask.BOUND:
+                bound = _bound(system, along)
+                return lambda system: _against(system.delays.d_1, bound)
+            case Ask.MARGIN:
+                found = _margin(system, along)
+                return lambda _: found
+            case Ask.TUNE:
+                return lambda system: _tune(system, along, self.options)
+            case Ask.SIMULATE:
+                return _run
 
 
-def _nothing(_: str) -> None:
-    """What was left out of a motion is said once, before the sweep."""
-
-
-def _certify(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]:
-    answer = certify(system, along).confirmed().answer
+def _certified(system: System, answer: Answer) -> dict[str, Any]:
     return {
         "status": answer.status.value,
         "max_delay_s": answer.max_delay_s,
@@ -142,7 +163,27 @@ def _certify(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]
     }
 
 
-def _margin(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]:
+def _bound(system: System, along: Motion | None) -> dict[str, Any]:
+    motion = system.still() if along is None else along
+    rest = system.rest(motion) if len(motion) == 1 else None
+    found = system.certified_bounds(system.spaces(motion), rest, motion)
+    worst = int(np.argmin(found.delay))
+    shares = np.abs(found.worst_motion(worst)) ** 2
+    return {
+        "max_delay_s": float(found.delay[worst]),
+        "limiting_joint": _largest(dict(zip(system.robot.joints, shares.tolist(), strict=True))),
+        "worst_instant": worst,
+        "worst_time_s": float(motion.time[worst]),
+        "reasons": "; ".join(found.refusals),
+    }
+
+
+def _against(delay: float, bound: dict[str, Any]) -> dict[str, Any]:
+    """A bound beside the design's delay, s."""
+    return {**bound, "passive": 0.0 < bound["max_delay_s"] >= delay, "delay_s": delay}
+
+
+def _margin(system: System, along: Motion | None) -> dict[str, Any]:
     found = system.local_margins(along)
     return {
         "passive_s": found.passive_s,
@@ -158,7 +199,7 @@ def _margin(system: System, along: Any, _: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _tune(system: System, along: Any, options: Mapping[str, Any]) -> dict[str, Any]:
+def _tune(system: System, along: Motion | None, options: Mapping[str, Any]) -> dict[str, Any]:
     tuned = tune(system, along, **options)
     binding = tuned.binding
     return {
@@ -198,12 +239,6 @@ def _largest(shares: Mapping[str, float]) -> str | None:
     return max(shares, key=lambda name: shares[name]) if shares else None
 
 
-_ANSWERS: dict[Ask, Callable[..., dict[str, Any]]] = {
-    Ask.CERTIFY: _certify,
-    Ask.MARGIN: _margin,
-    Ask.TUNE: _tune,
-}
-
 _COLUMNS: dict[Ask, dict[str, type]] = {
     Ask.CERTIFY: {
         "status": str,
@@ -213,6 +248,15 @@ _COLUMNS: dict[Ask, dict[str, type]] = {
         "first_crossing_s": float,
         "stable": bool,
         "unstable_modes": int,
+        "limiting_joint": str,
+        "worst_instant": int,
+        "worst_time_s": float,
+        "reasons": str,
+    },
+    Ask.BOUND: {
+        "passive": bool,
+        "max_delay_s": float,
+        "delay_s": float,
         "limiting_joint": str,
         "worst_instant": int,
         "worst_time_s": float,
@@ -260,6 +304,7 @@ _COLUMNS: dict[Ask, dict[str, type]] = {
 
 _HEADLINES = {
     Ask.CERTIFY: "max_delay_s",
+    Ask.BOUND: "max_delay_s",
     Ask.MARGIN: "delay_s",
     Ask.TUNE: "limit",
     Ask.SIMULATE: "deviation_rms",
@@ -267,6 +312,7 @@ _HEADLINES = {
 
 _VERDICTS = {
     Ask.CERTIFY: "status",
+    Ask.BOUND: "passive",
     Ask.MARGIN: None,
     Ask.TUNE: "found",
     Ask.SIMULATE: "outcome",

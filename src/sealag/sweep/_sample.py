@@ -99,6 +99,13 @@ class Sample:
             )
         return cls(kind=Kind.GRID, axes=axes, points=points, seed=0)
 
+    @property
+    def alike(self) -> int:
+        """How many points in a row differ in their delays alone."""
+        if self.kind is not Kind.GRID:
+            return 1
+        return math.prod(axis.values.size for axis in self.axes if axis.key.table == "delays")
+
     def block(self, start: int, stop: int) -> list[tuple[Value, ...]]:
         """Return the values of the points from one number to before another.
 

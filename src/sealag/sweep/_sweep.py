@@ -12,8 +12,8 @@ from sealag.errors import InputError, SealagError
 from sealag.sweep._axis import Axis, Choices
 from sealag.sweep._cluster import on_cluster
 from sealag.sweep._dataset import Dataset
-from sealag.sweep._job import ERROR, KIND, POINT, Job, asked, digest_of
-from sealag.sweep._plot import draw, ending_of
+from sealag.sweep._job import ERROR, KIND, POINT, Bench, Job, asked, digest_of
+from sealag.sweep._plot import draw
 from sealag.sweep._question import Question
 from sealag.sweep._sample import Sample
 from sealag.sweep._swept import Swept, summed_up
@@ -56,7 +56,7 @@ class Sweep:
             project: the project file, or `bundled:hume`.
             over: expressions KEY=1,2,5 or KEY=LOW:HIGH:log40 (lin40, int; without the number for
                 samples); KEY is a dotted path in the file, with places from 0 or names in lists.
-            ask: certify, margin, simulate, tune, or tune:aim=damping,number=jitter.
+            ask: certify, bound, margin, simulate, tune, or tune:aim=damping,number=jitter.
             motion: a motion's file; the project's own, or its posture, if None.
             sample: grid, lhs:POINTS, lhs:POINTS:SEED, or sobol likewise.
             tell: called with each sentence on what was left out of the motion.
@@ -70,7 +70,9 @@ class Sweep:
             FileError: a file cannot be read.
         """
         system = load(project)
-        axes = tuple(Axis.of(text) for text in over)
+        given = [Axis.of(text) for text in over]
+        # Designs that differ in their delays alone lie side by side: they share what is computed.
+        axes = tuple(sorted(given, key=lambda axis: axis.key.table == "delays"))
         if not axes:
             raise InputError("Nothing is swept; say what, such as --over KEY=LOW:HIGH:lin10.")
         question = Question.of(ask)
@@ -102,8 +104,11 @@ class Sweep:
 
     @property
     def block(self) -> int:
-        """Points of a part of the dataset."""
-        return min(max(1, -(-self.sample.points // MOST_BLOCKS)), LARGEST_BLOCK)
+        """Points of a part of the dataset; a grid's designs that differ in their delays alone are
+        not divided among workers, if they are few."""
+        least = max(1, -(-self.sample.points // MOST_BLOCKS))
+        alike = self.sample.alike if self.job.question.spans_delays else 1
+        return min(-(-least // alike) * alike, LARGEST_BLOCK)
 
     def run(
         self,
@@ -165,18 +170,6 @@ class Sweep:
             FileError: the picture cannot be written.
         """
         draw(self.dataset(folder), self.sample, self.job.question, path)
-
-    @staticmethod
-    def check_plot(path: Path) -> None:
-        """Refuse a picture that could not be drawn, before anything is computed.
-
-        Args:
-            path: the picture.
-
-        Raises:
-            InputError: its ending is none of a picture's.
-        """
-        ending_of(path)
 
     def dataset(self, folder: Path) -> Dataset:
         """Return the sweep's dataset in a folder.
@@ -259,11 +252,11 @@ def _tried(axis: Axis, job: Job) -> set[Path]:
         motion=None,
         digests={},
     )
-    files: set[Path] = set()
+    bench, files = Bench(alone), set[Path]()
     refused: SealagError | None = None
     for value in axis.probes():
         try:
-            files |= {*load(job.path, text=alone.text_with([value])).files}
+            files |= {*bench.system([value]).files}
         except SealagError as error:
             refused = refused or error
     if not files and refused is not None:

@@ -1,23 +1,21 @@
 """From gains to an answer: the number that they reach, what stops them, the certificate."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from sealag.design import System, certify
-from sealag.errors import ContractionError, SolverError
+from sealag.errors import ContractionError, InputError, SolverError
 from sealag.passivity import Certificate, Criterion, Status
+from sealag.tune._curve import number_along
+from sealag.tune._findings import Index, Point, Replaced
 from sealag.tune._question import Aim, Number, Question, pd_keys
 from sealag.tune._room import transparency_of
 from sealag.tune._write import as_file, kd_of_file
 from sealag.typing import Array
 from sealag.units import time_text
-
-_SURELY = 1e-3
-"""1/s: growth that no rounding of a loop's zero roots makes. Slower growth is left to the margin's
-own decision, which takes longer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +23,8 @@ class Binding:
     """What stops a gain.
 
     Attributes:
-        kind: "delay"; "transparency" where its limit keeps damping away that the delay asks for;
+        kind: "delay"; "index" where the quadratic index is least; "transparency" where its limit
+            keeps damping away that the delay asks for;
             "period" or "noise" where it bounds the shaping; "spring" where the springs have more of
             the limiting compliance; "stability" where the loop loses its stability before its
             passivity, or even without delay.
@@ -59,13 +58,17 @@ class Tuned:
         scale: common factor of the old stiffness; None for other aims and shares.
         limit: at the boundary itself: the common factor, the mean of the groups' factors, the
             bandwidth (rad/s), the cost of the damping (Nms/rad, or J), or by how much less than
-            the passive damping a margin needs; None where nothing bounds it.
+            the passive damping a margin needs, or the quadratic index; None where nothing bounds
+            it.
         bandwidth_rad_s: of joint PD; None for other aims.
         factors: of each group of gains; empty for other aims.
         binding: what stops the gains; None where they reach no delay.
         certificate: of the design with the gains, or with those that fail whatever they are; None
             if none were tried.
         reasons: why the delay is not reached, in words.
+        mapping: how well drives replace the controller's damping; None for other aims.
+        index: the quadratic index; None for other aims.
+        front: designs that no other one beats; empty for other aims.
     """
 
     question: Question
@@ -79,6 +82,9 @@ class Tuned:
     binding: Binding | None = None
     certificate: Certificate | None = None
     reasons: tuple[str, ...] = ()
+    mapping: Replaced | None = None
+    index: Index | None = None
+    front: tuple[Point, ...] = ()
 
     @classmethod
     def none(cls, question: Question, *reasons: str) -> "Tuned":
@@ -141,6 +147,48 @@ class Tuned:
             **known,
         )
 
+    @property
+    def passive_only(self) -> bool:
+        """Whether the gains are passive as required and no equilibrium is shown to be stable, as of
+        a walk on point feet, which something else must hold."""
+        certificate, reached = self.certificate, self.reached_s
+        return (
+            self.question.number is Number.PASSIVE
+            and certificate is not None
+            and certificate.answer.status is Status.PASSIVE_ONLY
+            and reached is not None
+            and reached >= self.question.required
+        )
+
+    def pick(self, number: int) -> "Tuned":
+        """Return the certified design of a point of the front.
+
+        Args:
+            number: of the point.
+
+        Raises:
+            InputError: there is no such point.
+        """
+        if not 1 <= number <= len(self.front):
+            raise InputError(f"The front has no point {number}; it has 1 … {len(self.front)}.")
+        point = self.front[number - 1]
+        design = Tuned.of(self.question, point.system, scale=point.scale)
+        return replace(design, front=self.front)
+
+    def tolerated(self, shares: Sequence[float]) -> Array:
+        """Return the question's number of the gains times each share, (N,) s; NaN where not known.
+
+        Shares are those of the stiffness; of the damping where the least was asked for, and of the
+        bandwidth of joint PD at its damping ratio.
+
+        Args:
+            shares: positive factors.
+
+        Raises:
+            InputError: shaping was asked for, of which no delay depends.
+        """
+        return number_along(self.question, self.system, shares)
+
     def gains(self) -> dict[str, Any]:
         """Return the design's gains by the names that its project file has for them."""
         law, joints = self.system.law, self.system.robot.joints
@@ -160,6 +208,7 @@ class Tuned:
     def summary(self) -> dict[str, Any]:
         """Return everything as JSON says it: None for what is not known or does not exist."""
         asked, reached, certificate = self.question, self.reached_s, self.certificate
+        joints = self.system.robot.joints
         return {
             "found": self.found,
             "aim": asked.aim.value,
@@ -176,58 +225,12 @@ class Tuned:
             "limits": dict(asked.limits),
             "transparency": transparency_of(asked, self.system),
             "binding": None if self.binding is None else asdict(self.binding),
+            "mapping": None if self.mapping is None else self.mapping.summary(joints),
+            "index": None if self.index is None else asdict(self.index),
+            "front": [point.summary() for point in self.front],
             "certificate": None if certificate is None else certificate.summary(),
             "reasons": list(self.reasons),
         }
-
-
-def passive_bound(question: Question, system: System) -> float:
-    """Return the smallest passive bound of a design along the question's motion, s.
-
-    Args:
-        question: along which motion.
-        system: the design.
-    """
-    return float(_bounds(question, system).min())
-
-
-def _bounds(question: Question, system: System) -> Array:
-    """The passive bound of each instant (N,), s."""
-    return system.certified_bounds(system.spaces(question.motion), None, question.motion).delay
-
-
-def number_of(question: Question, system: System) -> tuple[float | None, str]:
-    """Return the delay that counts of a design, s, and what stands in its way.
-
-    Args:
-        question: which number, along which motion.
-        system: the design.
-
-    Returns:
-        The delay, None if not known; and "delay", "spring" or "stability".
-    """
-    if question.number is Number.PASSIVE:
-        return passive_bound(question, system), "delay"
-    try:
-        if _unstable(question, system):  # its crossings, which nobody asks for, can take minutes
-            return 0.0, "stability"
-        if question.number is Number.CONSTANT:
-            local = system.local(_bounds(question, system), question.motion)
-            return local.margin_s, "stability" if local.unstable_modes else "delay"
-        margins = system.local_margins(question.motion)
-    except ContractionError:
-        return 0.0, "spring"
-    except SolverError:
-        return None, "delay"
-    return margins.jitter_s, "stability" if margins.unstable_modes else "delay"
-
-
-def _unstable(question: Question, system: System) -> bool:
-    """Whether the first instant is surely unstable without delay where it is held."""
-    motion = question.motion
-    loop = system.frozen(motion, 0, rest=system.in_posture(motion, 0))
-    rightmost = loop.roots(0.0, count=1)
-    return bool(len(rightmost)) and float(rightmost.real.max()) > _SURELY
 
 
 def _of(question: Question, margins: Any) -> float | None:

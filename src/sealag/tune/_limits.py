@@ -96,13 +96,9 @@ class Limits:
         Raises:
             SolverError: the solver gives up.
         """
-        roots = [self._inverse_root(limit) for limit in self.series]
-        if any(root is None for root in roots):
+        A = self.whitened()
+        if A is None:
             return np.zeros(len(self.parts))
-        # (G, J N, n, n): every limit of every instant is Σ f_g A_g ≼ I.
-        A = np.concatenate(
-            [np.swapaxes(R, -1, -2) @ self.parts @ R for R in roots if R is not None], axis=1
-        )
         alone = np.linalg.eigvalsh(A)[..., -1]  # (G, J N)
         size = alone.max(axis=1)
         moving = size > _NONE * size.max()
@@ -118,6 +114,16 @@ class Limits:
                 return factors
             active.append(worst)
         raise SolverError(f"no gains were found in {_ROUNDS} rounds; take fewer instants")
+
+    def whitened(self) -> Array | None:
+        """Return A (G, J N, n, n): every limit of every instant is Σ f_g A_g ≼ I; None where one is
+        met by no gains."""
+        roots = [self._inverse_root(limit) for limit in self.series]
+        if any(root is None for root in roots):
+            return None
+        return np.concatenate(
+            [np.swapaxes(R, -1, -2) @ self.parts @ R for R in roots if R is not None], axis=1
+        )
 
     def _inverse_root(self, limit: Series) -> Array | None:
         """R (N, n, n) with Rᵀ L R = I; None where L is not positive definite."""

@@ -36,7 +36,7 @@ class Knobs:
         self.question = question
         self.system = system
         self.groups: tuple[Group, ...] = groups_of(system.law, system.robot, question.share)
-        self._parts = parts_of(system, self.groups, question.motion)
+        self.parts = parts_of(system, self.groups, question.motion)
         held = system.spaces(question.motion).F_gravity
         self._held = (held + np.swapaxes(held, -1, -2)) / 2.0
 
@@ -50,7 +50,7 @@ class Knobs:
         series = self.system.law.signal.limits(
             drives.spring_stiffness, delay / drives.motor_damping
         )
-        return Limits(parts=self._parts, held=self._held, series=series)
+        return Limits(parts=self.parts, held=self._held, series=series)
 
     def stiffest(self, delay: float) -> tuple[Array, Wall]:
         """Return the factors (G,) at their limit for a delay, and what stops them.
@@ -93,7 +93,8 @@ def damped(question: Question, delay: float, room: Room) -> tuple[System, float]
     """
     system, motion = question.system, question.motion
     spaces = system.spaces(motion)
-    if not (np.isfinite(spaces.F_theta).all() and (spaces.contraction < 1.0).all()):
+    # q̄(θ) needs springs that are stiffer than the tasks; motor angles do not.
+    if not np.isfinite(spaces.F_theta).all() or system.law.signal.refusal(spaces.contraction):
         return "the tasks are stiffer than the springs; tune the stiffness first"
     F = (spaces.F_theta + np.swapaxes(spaces.F_theta, -1, -2)) / 2.0
     root = np.sqrt(room.most)

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from sealag.design import System
-from sealag.errors import InputError
+from sealag.errors import InputError, either
 from sealag.robot import Motion
 
 LARGEST_SAFETY = 1e3
@@ -23,6 +23,9 @@ class Aim(StrEnum):
     DAMPING = "damping"
     DRAG = "drag"
     SHAPING = "shaping"
+    MAPPING = "mapping"
+    OPTIMAL = "optimal"
+    FRONT = "front"
 
 
 class Limit(StrEnum):
@@ -31,6 +34,22 @@ class Limit(StrEnum):
     BANDWIDTH = "bandwidth"
     RMS = "rms"
     NOISE = "noise"
+    ERROR = "error"
+    TORQUE = "torque"
+
+
+_TRANSPARENCY = frozenset({Limit.BANDWIDTH, Limit.RMS})
+_TAKEN = {
+    Aim.STIFFNESS: _TRANSPARENCY,
+    Aim.DAMPING: _TRANSPARENCY,
+    Aim.DRAG: _TRANSPARENCY,
+    Aim.FRONT: _TRANSPARENCY,
+    Aim.SHAPING: frozenset({Limit.NOISE}),
+    Aim.OPTIMAL: frozenset({Limit.ERROR, Limit.TORQUE}),
+}
+"""Which limits each aim takes; none for the others."""
+_SHARED = (Aim.STIFFNESS, Aim.OPTIMAL)
+"""Aims whose stiffness may have more than one factor."""
 
 
 class Number(StrEnum):
@@ -63,7 +82,8 @@ class Question:
         bandwidth: of joint PD, rad/s; None for the largest.
         damping_ratio: of joint PD.
         limits: of transparency: least bandwidth of the locked joints, Hz; largest RMS of Γ_sea
-            against its command along the motion, Nm; of shaping: largest gain of torque noise.
+            against its command along the motion, Nm; of shaping: largest gain of torque noise; of
+            the quadratic index: the error (m or rad) that counts as much as the torque (Nm).
     """
 
     system: System
@@ -89,11 +109,15 @@ class Question:
                 "Tune for fewer of its rows, and certify the motion with the gains."
             )
         if self.share is not Share.COMMON and (
-            self.aim is not Aim.STIFFNESS or self.number is not Number.PASSIVE
+            self.aim not in _SHARED or self.number is not Number.PASSIVE
         ):
             raise InputError(
-                f"A factor for each {self.share} is found for the largest stiffness by the passive "
-                "number only; let the share be common."
+                f"A factor for each {self.share} is found for the largest or the optimal stiffness "
+                "by the passive number only; let the share be common."
+            )
+        if self.aim in (Aim.OPTIMAL, Aim.FRONT) and self.number is not Number.PASSIVE:
+            raise InputError(
+                f"The aim {self.aim} is a program of the passive bound; let the number be passive."
             )
         if self.aim is not Aim.BANDWIDTH and self.bandwidth is not None:
             raise InputError("A bandwidth is given, but the aim is another; maximize bandwidth.")
@@ -107,35 +131,47 @@ class Question:
                 f"{self.system.name} has no joint PD whose bandwidth could be set "
                 '(controller.kind = "joint_pd"); maximize stiffness.'
             )
-        if self.aim is Aim.SHAPING or Limit.NOISE in self.limits:
-            self._check_shaping()
-        elif self.limits:
-            self._check_limits()
+        if self.aim is Aim.MAPPING and not self.system.law.damped:
+            raise InputError(
+                f"No task of {self.system.name} has a damping, which drives could take over "
+                '(damping in [[tasks]], or damping_at = "controller" of joint PD).'
+            )
+        self._check_limits()
+        if self.aim is Aim.SHAPING and not self.system.delays.embedded_period > 0.0:
+            raise InputError(
+                f"{self.system.name} states no period of its drives' loop, which bounds the "
+                "shaping; give embedded_period_ms in [delays]."
+            )
+        if self.aim is Aim.FRONT or set(self.limits) & _TRANSPARENCY:
+            self._check_transparency()
 
     @property
     def moves(self) -> bool:
         """Whether it has a motion of two instants and more, of which there are means."""
         return self.motion is not None and len(self.motion) > 1
 
-    def _check_shaping(self) -> None:
-        """Refuse shaping without a period, and limits that are not its own."""
-        if self.aim is not Aim.SHAPING or set(self.limits) - {Limit.NOISE}:
+    def _check_limits(self) -> None:
+        """Refuse limits that the aim does not keep."""
+        taken = _TAKEN.get(self.aim, frozenset())
+        for limit in self.limits:
+            if limit not in taken:
+                aims = [str(aim) for aim, limits in _TAKEN.items() if limit in limits]
+                raise InputError(
+                    f"The limit {limit} is for --aim {either(aims)}, not for {self.aim}; leave it "
+                    "out."
+                )
+        if self.aim is Aim.OPTIMAL and set(self.limits) != taken:
             raise InputError(
-                "The limit noise is for shaping (--aim shaping), and the only one that it takes."
+                "The quadratic index weighs errors against torques; give the error that counts as "
+                "much as the torque (--limit error=0.02 --limit torque=30Nm)."
             )
-        if not self.system.delays.embedded_period > 0.0:
+        if self.limits and self.number is not Number.PASSIVE and self.aim is not Aim.SHAPING:
             raise InputError(
-                f"{self.system.name} states no period of its drives' loop, which bounds the "
-                "shaping; give embedded_period_ms in [delays]."
+                "Limits are kept for the passive number only; leave --limit out, or --number."
             )
 
-    def _check_limits(self) -> None:
-        """Refuse limits that nothing keeps, or whose closed forms do not hold."""
-        if self.aim is Aim.BANDWIDTH or self.number is not Number.PASSIVE:
-            raise InputError(
-                "Limits of transparency are for the largest stiffness, the least damping or drag "
-                "by the passive number only; leave --limit out."
-            )
+    def _check_transparency(self) -> None:
+        """Refuse what the closed forms of transparency leave out."""
         if Limit.RMS in self.limits and not self.moves:
             raise InputError(
                 "The RMS of the torque against its command is one along a motion; give a motion "

@@ -9,9 +9,13 @@ import numpy as np
 from sealag.design import System
 from sealag.errors import InputError, word
 from sealag.robot import Motion
-from sealag.tune._answer import Tuned, number_of, passive_bound
+from sealag.tune._answer import Tuned
+from sealag.tune._front import front_of
 from sealag.tune._gains import rounded
 from sealag.tune._joint_pd import joint_inertia, pd_design
+from sealag.tune._mapping import mapped
+from sealag.tune._numbers import number_of, passive_bound
+from sealag.tune._optimal import optimal
 from sealag.tune._passive import EASE, Knobs, damped
 from sealag.tune._question import LARGEST_SAFETY, Aim, Limit, Number, Question, Share
 from sealag.tune._room import closed_text, least_of, room_of
@@ -100,6 +104,12 @@ def tune(
         return _bandwidth(question)
     if question.aim is Aim.SHAPING:
         return least_shaping(question)
+    if question.aim is Aim.MAPPING:
+        return mapped(question)
+    if question.aim is Aim.OPTIMAL:
+        return optimal(question)
+    if question.aim is Aim.FRONT:
+        return front_of(question)
     if question.aim is not Aim.STIFFNESS:
         return _least_damping(question)
     if question.number is Number.PASSIVE:

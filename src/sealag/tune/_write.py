@@ -10,7 +10,7 @@ import tomlkit
 from sealag.design import System, load
 from sealag.toml import table_in, text_of
 from sealag.tune._question import pd_keys
-from sealag.typing import Array
+from sealag.typing import Array, ArrayLike
 
 
 def as_file(before: System, after: System) -> System:
@@ -37,6 +37,8 @@ def as_file(before: System, after: System) -> System:
         for table, was, task in zip(document["tasks"], before.law.tasks, after.law.tasks):
             if not np.array_equal(was.stiffness, task.stiffness):
                 table["stiffness"] = _plain(task.stiffness)
+            if not np.array_equal(was.damping, task.damping):
+                table["damping"] = _plain(task.damping)
         damping = old.motor_damping, new.motor_damping
         _put_drives(document, "motor_damping", joints, *damping)
     if not np.array_equal(old.shaped_inertia, new.shaped_inertia):
@@ -51,7 +53,7 @@ def as_file(before: System, after: System) -> System:
     return replace(read, delays=after.delays)
 
 
-def _plain(values: Array) -> Any:
+def _plain(values: ArrayLike) -> Any:
     return np.asarray(values, dtype=float).tolist()
 
 
@@ -61,11 +63,15 @@ def _put_pd(document: Any, before: System, after: System) -> None:
     old, new = before.law.tasks[0], after.law.tasks[0]
     if not np.array_equal(old.stiffness, new.stiffness):
         _put_each(controller, "kp", joints, new.stiffness)
-    if damps_late(before):
+    moved = not np.array_equal(before.actuators.motor_damping, after.actuators.motor_damping)
+    if damps_late(before) and moved:  # the drives take over
+        controller["damping_at"] = "drive"
+        _put_each(controller, "kd", joints, drive_kd(after, before.actuators.motor_damping))
+    elif damps_late(before):
         late = np.broadcast_to(new.damping, len(joints))
         if not np.array_equal(np.broadcast_to(old.damping, len(joints)), late):
             _put_each(controller, "kd", joints, late)
-    elif not np.array_equal(before.actuators.motor_damping, after.actuators.motor_damping):
+    elif moved:
         _put_each(controller, "kd", joints, drive_kd(after, base_damping(before)))
 
 
