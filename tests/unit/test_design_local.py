@@ -177,3 +177,25 @@ def test_one_unstable_instant_makes_the_motion_unstable(tmp_path):
     assert local.margin_s == 0.0
     assert local.unstable_modes == max(each)
     assert each[local.critical] == max(each)
+
+
+def test_a_search_that_begins_at_the_last_instant_finds_the_same():
+    """A motion whose margin moves by more than the search begins with, up and down."""
+    system = sealag.load(EXAMPLES / "panda.toml")
+    turn = np.zeros(system.robot.nv)
+    turn[3] = 1.0
+    places = [system.robot.integrate(system.posture, a * turn) for a in (0.5, -0.3, 0.0)]
+    motion = Motion(
+        time=0.1 * np.arange(3), q=np.array(places), v=np.zeros((3, system.robot.nv)),
+        contact_sets=((),), contact_index=np.zeros(3, dtype=int),
+    )  # fmt: skip
+    alone = [
+        min(
+            system.frozen(motion, k, rest=rest).margin().delay
+            for rest in (system.in_posture(motion, k), system.rest(motion, k))
+        )
+        for k in range(3)
+    ]
+    assert alone[1] > 1.06 * alone[0]
+    found = sealag.certify(system, motion).evidence.instant_margins_s
+    np.testing.assert_allclose(np.array(found, dtype=float), alone, rtol=1e-9)

@@ -361,3 +361,26 @@ def test_a_direction_that_is_no_symmetry_is_refused():
     A_0, B, C = joint(0.1, 10.0, 100.0)
     with pytest.raises(SolverError, match="no symmetry"):
         DelayedLoop(A_0, B, C, symmetries=[[0.0], [1.0]]).jitter_margin()
+
+
+@pytest.mark.parametrize("law", ["stiffness", "asymmetric", "pd", "links"])
+def test_what_is_asked_for_is_proven_if_and_only_if_it_is_below_the_margin(law):
+    """One level of the norm decides; the control is the level just above it."""
+    for seed in range(4):
+        A_0, B, C, _ = plant(np.random.default_rng(seed), law=law)
+        loop = DelayedLoop(A_0, B, C)
+        whole = loop.jitter_margin()
+        if not 0.0 < whole.delay < math.inf:
+            continue
+        for share in (1e-3, 0.5, 0.999):
+            asked = loop.jitter_margin(at_most=share * whole.delay)
+            assert asked.delay == share * whole.delay
+        for share in (1.001, 2.0, 1e3):
+            assert loop.jitter_margin(at_most=share * whole.delay).delay == whole.delay
+
+
+def test_nothing_is_proven_of_a_loop_that_is_unstable_without_delay():
+    A_0, B, C = joint(0.1, -1.0, 100.0)
+    assert DelayedLoop(A_0, B, C).jitter_margin(at_most=1e-6).delay == 0.0
+    with pytest.raises(InputError, match="at_most"):
+        DelayedLoop(A_0, B, C).jitter_margin(at_most=-1.0)

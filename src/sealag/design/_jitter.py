@@ -44,7 +44,9 @@ def jitter_along(along: Along, bounds: Array, local: Local) -> float | None:
             return float(covered[k])
         searched += bool(covered[k])
         try:
-            least = min(least, *(loop.jitter_margin().delay for loop in loops_at(along, k, local)))
+            for loop in loops_at(along, k, local):
+                longest = least if np.isfinite(least) else None
+                least = min(least, loop.jitter_margin(at_most=longest).delay)
         except SolverError:
             return None
     return float(least)

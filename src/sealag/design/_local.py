@@ -22,6 +22,10 @@ _BEYOND = (4.0, 32.0)
 """Passive bounds up to which crossings are searched, before all are. Margins of robots lie within
 twice the bound; ten times longer searches cost as much as those for all crossings."""
 
+_BESIDE_LAST = 1.05
+"""First crossings of the last instant up to which the next one's is searched. Motions move it by a
+percent or so from instant to instant; twice as far costs up to twice as much."""
+
 _FEW = 50  # instants up to which all are decided, also once one is known to be unstable
 _AT_REST = 1e-7
 """Share of weight and torques that may be unbalanced in a posture that counts as at rest. Ten times
@@ -192,7 +196,7 @@ class _Decision:
         self._basis = np.full(count, Basis.OPEN, dtype=object)
         self._delay, self._roots = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
         self._best: _Known | None = None
-        self._critical = 0
+        self._critical, self._near = 0, np.nan
 
     def run(self) -> Local:
         count = len(self._motion)
@@ -292,7 +296,8 @@ class _Decision:
                     "another posture"
                 )
             else:
-                margin = _first_crossing(loop, float(self._bounds[k]))
+                margin = _first_crossing(loop, float(self._bounds[k]), near=self._near)
+                self._near = float(margin.first_crossing)
                 if not margin.unstable_roots and not margin.guaranteed:
                     problem = problem or (
                         "rounding does not tell whether its slowest roots ever cross the axis"
@@ -338,14 +343,22 @@ class _Decision:
         return bool(values[0] > _MINIMUM * values[-1])
 
 
-def _first_crossing(loop: FrozenLoop, bound: float) -> DelayMargin:
-    """The margin of a loop, searched first where it usually is: within a few bounds.
+def _first_crossing(loop: FrozenLoop, bound: float, *, near: float) -> DelayMargin:
+    """The margin of a loop, searched first where it usually is: at that of the loop before, and
+    within a few bounds.
 
     A search up to a delay is several times shorter than one for all crossings, and what it finds is
     the same: the first one.
+
+    Args:
+        loop: the loop.
+        bound: its passive bound, s; 0 without one.
+        near: first crossing of the loop before, s; NaN or inf without one.
     """
-    for share in _BEYOND if 0.0 < bound < np.inf else ():
-        margin = loop.margin(at_most=share * bound)
+    tried = [_BESIDE_LAST * near] if 0.0 < near < np.inf else []
+    tried += [share * bound for share in _BEYOND if 0.0 < bound < np.inf]
+    for longest in tried:
+        margin = loop.margin(at_most=longest)
         if np.isfinite(margin.first_crossing) or np.isnan(margin.first_crossing):
             return margin
     return loop.margin()

@@ -101,7 +101,11 @@ class DelayedLoop:
         )
 
     def jitter_margin(
-        self, channels: Mapping[str, Sequence[int]] | None = None, *, alone: bool = True
+        self,
+        channels: Mapping[str, Sequence[int]] | None = None,
+        *,
+        alone: bool = True,
+        at_most: float | None = None,
     ) -> JitterMargin:
         """Largest delay below which d may vary as it likes; docs/theory section 7.4.
 
@@ -123,12 +127,14 @@ class DelayedLoop:
         at its own singular values; the x_k are optimised (`Channels`).
 
         Cost: an eigenvalue problem of 2 n a step, three or four steps: 10 ms for 36 states, 0.3 s
-        for 76; with several delays ten times as much.
+        for 76; one step where `at_most` is proven; with several delays ten times as much.
 
         Args:
             channels: rows of C by name, each row in one channel, whose delays vary independently,
                 each up to d; None for one delay of all.
             alone: whether to bound also what each channel tolerates if only that is late.
+            at_most: longest delay of interest, s: whether one delay of all up to it is proven takes
+                one step; None for the largest one.
 
         Returns:
             The margin, at most that of `margin`, which is of constant delays only; with
@@ -139,6 +145,7 @@ class DelayedLoop:
                 the channels do not hold each row once.
             SolverError: a matrix moves a symmetry, or rounding leaves the norm open.
         """
+        longest = None if at_most is None else time_of("at_most", at_most)
         loop, broken = self._parts()
         if channels is not None:
             rows = self._rows_of(channels)
@@ -149,7 +156,7 @@ class DelayedLoop:
             return replace(found, channels=dict(zip(channels, each)))
         if broken.late < len(broken.right):
             return channel_margin(loop, Channels.of_broken(broken, loop.embedded_delay))
-        return jitter_margin(loop, broken)
+        return jitter_margin(loop, broken, at_most=longest)
 
     def jitter_multipliers(
         self, rows: ArrayLike, embedded_rows: ArrayLike | None = None

@@ -34,8 +34,10 @@ class JitterMargin:
 
     Attributes:
         delay: s; the loop is stable for every measurable τ(t) with 0 ≤ τ(t) ≤ delay. 0 where a root
-            is not in the open left half-plane without delay, inf where nothing is late.
-        upper: s; no multiplier X proves more. A longer delay need not be unstable.
+            is not in the open left half-plane without delay, inf where nothing is late; `at_most`
+            where that was given and is proven.
+        upper: s; no multiplier X proves more. A longer delay need not be unstable. inf where
+            `at_most` is proven.
         frequency: at which the bound is reached, rad/s; inf above all roots, NaN without a bound.
         unstable_roots: roots not in the open left half-plane without delay, symmetries left out.
         neutral: structural zero roots taken out.
@@ -50,15 +52,19 @@ class JitterMargin:
     channels: Mapping[str, float] = field(default_factory=dict)
 
 
-def jitter_margin(loop: Loop, broken: "Broken") -> JitterMargin:
+def jitter_margin(loop: Loop, broken: "Broken", *, at_most: float | None = None) -> JitterMargin:
     """Bound `DelayedLoop.jitter_margin` of a loop whose one delay is that of its command.
 
     Args:
         loop: the prepared loop.
         broken: it, broken where it is late.
+        at_most: longest delay of interest, s.
     """
     unstable = roots_at_once(loop.A_0 + loop.A_1)[0] if len(loop.A_0) else 0
-    found = _Bound(0.0, 0.0, math.nan) if unstable else _bound(broken)
+    found = _Bound(0.0, 0.0, math.nan)
+    if not unstable:
+        enough = None if at_most is None or at_most <= 0.0 else _tolerates(broken, at_most)
+        found = enough or _bound(broken)
     return JitterMargin(
         delay=found.delay, upper=found.upper, frequency=found.frequency, unstable_roots=unstable,
         neutral=loop.neutral,
@@ -157,6 +163,24 @@ def _bound(broken: Broken) -> _Bound:
     at = plain.D if not math.isfinite(frequency) else plain.at(np.array([frequency]))[0]
     radius = float(np.abs(np.linalg.eigvals(at)).max())
     return _Bound(delay, max(1.0 / radius if radius else math.inf, delay), frequency)
+
+
+def _tolerates(broken: Broken, delay: float) -> _Bound | None:
+    """Whether a delay is proven: no singular value of T reaches its reciprocal at any frequency.
+
+    Responses are below it above all roots, and can only reach it where the Hamiltonian matrix of
+    this level has an eigenvalue on the axis; what rounding could hold there counts as such.
+    """
+    if not broken.late or not math.isfinite(delay):
+        return None
+    one = np.ones(len(broken.right))
+    plain, level = broken.scaled(one, one), 1.0 / delay
+    if float(np.linalg.norm(plain.D, 2)) * (1.0 + _BRACKET) >= level:
+        return None
+    roots, error = eigenvalues_with_error(plain.hamiltonian(level))
+    if (np.abs(roots.real) <= error).any():
+        return None
+    return _Bound(delay, math.inf, math.nan)
 
 
 def frequencies_of(A: Array) -> Array:

@@ -131,6 +131,16 @@ class LawEvaluation:
         return len(self.error)
 
     @property
+    def configuration(self) -> Array:
+        """(nq,) where the law was last evaluated."""
+        return self._at.q
+
+    @property
+    def fed_back(self) -> Array:
+        """(n,) joint angles that it was moved towards, rad."""
+        return self._at.joints
+
+    @property
     def gravity_is_fed_back(self) -> bool:
         """Whether ḡ is taken at the fed-back configuration."""
         return self.law.gravity is GravityCompensation.FEEDBACK

@@ -1,5 +1,6 @@
 """Where the loop rests: the equilibrium of links, springs, contacts and law."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,11 +31,15 @@ _ASTRAY = 1e3  # m, rad: a search for motor angles that steps so far has gone aw
 _ROUNDS = 60
 _LONGEST_STEP = 0.2  # rad: a longer Newton step leaves the region where its direction is good
 _HALVINGS = 12
+_BISECTIONS = 30  # of the logarithm of a weight: to a part in 1e7
 _QUICK = 0.1
 """Part of the residual that a step may leave for the law's derivative to serve once more: one costs
-as much as ten steps, so that it is taken anew only where it no longer leads on."""
+as much as several steps, so that it is taken anew only where it no longer leads on."""
 
-_PATIENCE = 12  # whole steps that need not bring the least residual yet
+_PATIENCE = 12
+"""Rounds in which the least residual must halve. Those that lead to an equilibrium need up to nine;
+without an end they cost a minute for a robot that buckles."""
+
 _CUTOFF = 1e-10  # of the largest singular value: directions along which nothing acts (symmetries)
 
 
@@ -152,27 +157,28 @@ class _Search:
         return self._answer(self._posture, self._held(), self._why())
 
     def _follow(self, *, falling: bool) -> tuple[Array, Array] | None:
-        """Newton's method from the posture, with steps that let the residual fall, or with whole
-        ones: a soft law sags past where the residual is larger."""
+        """Newton's method from the posture: with steps in a region of trust that let the residual
+        fall, or with whole directions and residuals that may rise in between, as where a soft law
+        sags past a posture that it cannot hold."""
         q, theta = self._posture, self._first(self._posture)
         residual = self._residual(q, theta)
-        least, since, slope = self._size(residual), 0, None  # slope: of the law and of the links
+        mark, since, slope = self._size(residual), 0, None  # slope: of the law and of the links
         for _ in range(_ROUNDS):
             if self._small(residual):
                 if slope is not None:  # digits that a last Newton step would have brought
-                    step = self._newton(q, residual, slope)
+                    step = self._newton(q, residual, slope, trusted=True)
                     q, theta, _, _ = self._search(q, theta, step, residual, falling=True)
                 return q, theta
             kept, before = slope is not None, self._size(residual)
             slope = slope or self._slope(q, theta)
-            step = self._newton(q, residual, slope)
+            step = self._newton(q, residual, slope, trusted=falling)
             q, theta, residual, moved = self._search(q, theta, step, residual, falling=falling)
-            if self._size(residual) > _QUICK * before:
+            size = self._size(residual)
+            if size > _QUICK * before:
                 slope = None
                 if kept and not moved:
                     continue
-            since = 0 if self._size(residual) < least else since + 1
-            least = min(least, self._size(residual))
+            mark, since = (size, 0) if size < mark / 2.0 else (mark, since + 1)
             if not moved or since > _PATIENCE:
                 return None
         return None
@@ -206,15 +212,17 @@ class _Search:
     def _held(self) -> Array:
         """Motor angles that rest under the law while the links are held in the posture."""
         joints, theta = self._robot.joint_positions(self._posture), self._first(self._posture)
-        out = np.zeros(self._robot.n)
+        out, least, since = np.zeros(self._robot.n), np.inf, 0
         try:
             for _ in range(_ROUNDS):
-                self._signal.settled(self._posture, theta, out)
+                self._signal.settled(self._posture, theta, out, nearby=True)
                 theta, last = joints + out / self._K, theta
                 step = np.abs(theta - last).max(initial=0.0)
                 if step < _PLACED:
                     return theta
-                if not step < _ASTRAY:  # a task that is stiffer than the springs drives it away
+                least, since = (step, 0) if step < least / 2.0 else (least, since + 1)
+                # A task that is stiffer than the springs drives it away.
+                if since > _PATIENCE or not step < _ASTRAY:
                     break
         except ContractionError:
             pass
@@ -224,7 +232,7 @@ class _Search:
         """Contact displacement (c,), forces along free motions (k,), torque left at motors (n,)."""
         joints = self._robot.joint_positions(q)
         springs, command = self._K * (theta - joints), np.zeros(self._robot.n)
-        self._signal.settled(q, theta, command)
+        self._signal.settled(q, theta, command, nearby=True)
         force = self._robot.gravity(q)
         force[self._robot.nv_base :] -= springs
         Z = null_space(self._plant.jacobian(q), self._robot.nv)
@@ -252,8 +260,11 @@ class _Search:
         q: Array,
         residual: tuple[Array, Array, Array],
         slopes: tuple[LawDerivative, Array],
+        *,
+        trusted: bool,
     ) -> Array:
-        """Step (nv + n,) of least norm."""
+        """Step (nv + n,) of least norm; the best one of the longest length if it is to be trusted
+        and longer: near a load at which the loop buckles, a full step is of any length."""
         robot, n, K = self._robot, self._robot.n, np.diag(self._K)
         base, (slope, H) = robot.nv_base, slopes
         J_s = self._plant.jacobian(q)
@@ -271,7 +282,22 @@ class _Search:
         ]
         away, force, torque = residual
         right = np.concatenate([away, force / self._scale, torque / self._scale])
-        return -np.linalg.lstsq(np.vstack(rows), right, rcond=_CUTOFF)[0]
+        U, values, V = np.linalg.svd(np.vstack(rows), full_matrices=False)
+        acts = values > _CUTOFF * values[0]
+        values, seen, V = values[acts], U[:, acts].T @ right, V[acts]
+
+        def step(weight: float) -> Array:
+            return -(values / (values**2 + weight) * seen) @ V
+
+        found = step(0.0)
+        if not trusted or np.abs(found).max() <= _LONGEST_STEP:
+            return found
+        low, high = math.log(_CUTOFF**2), math.log(1e4) + 2.0 * math.log(values[0])
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2.0
+            long = np.abs(step(math.exp(middle))).max() > _LONGEST_STEP
+            low, high = (middle, high) if long else (low, middle)
+        return step(math.exp(high))
 
     def _search(
         self,

@@ -8,6 +8,7 @@ import numpy as np
 from sealag.typing import Array
 from sealag.whole_body._evaluation import LawEvaluation
 from sealag.whole_body._protocol import Measurement
+from sealag.whole_body._slopes import slopes_of, weights
 from sealag.whole_body._tank import EnergyTank
 from sealag.whole_body._tasks import GravityCompensation
 
@@ -15,10 +16,6 @@ STEP = 2e-5
 """rad, m: half the base of central differences of the command, extrapolated with those of half the
 base. Near singular postures, where the law bends within 1e-3 rad, plain differences of 1e-5 rad
 leave 1e-5 of the derivative; these leave 5e-9, of which half is rounding."""
-
-_ROUGH = 1e-6
-"""rad, m: step of one-sided differences. Ten times larger leaves 1e-2 of the derivative where the
-law bends within 1e-3 rad, ten times smaller 1e-5 by rounding of the settled command."""
 
 
 class Present(NamedTuple):
@@ -147,13 +144,14 @@ class SignalState(Protocol):
         """
         ...
 
-    def settled(self, q: Array, theta: Array, out: Array) -> None:
+    def settled(self, q: Array, theta: Array, out: Array, *, nearby: bool = False) -> None:
         """Write the command of a state that does not move, once it has settled.
 
         Args:
             q: (nq,) configuration.
             theta: (n,) motor angles, rad.
             out: (n,) command, Nm, written.
+            nearby: start from the motions of the last state, which is near, not from those of q.
         """
         ...
 
@@ -206,13 +204,10 @@ class MeasuredAngles:
         """Return 0 for motor angles, K⁻¹ ḡ for link angles."""
         return carried / self._law.spring_stiffness if self._links else np.zeros_like(carried)
 
-    def settled(self, q: Array, theta: Array, out: Array) -> None:
+    def settled(self, q: Array, theta: Array, out: Array, *, nearby: bool = False) -> None:
         """Write the command of a state that does not move."""
-        self._law.follow(q)
-        self._settle(q, theta, out)
-
-    def _settle(self, q: Array, theta: Array, out: Array) -> None:
-        """The same, from the motions along which the base followed the joints of a state nearby."""
+        if not nearby:
+            self._law.follow(q)
         law, joints = self._law, self._joints(q, theta)
         away = joints - law.robot.joint_positions(q)
         law.settled(lambda: law.at(q, joints, out), lambda: away)
@@ -220,28 +215,28 @@ class MeasuredAngles:
     def derivative(
         self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
     ) -> LawDerivative:
-        """Differentiate the settled command."""
-        self._law.follow(q)
+        """Differentiate the settled command: s = θ, or q_j where the links are fed back."""
+        self.settled(q, theta, np.zeros(self._law.robot.n))
+        slopes = slopes_of(self._law, q, 0.0 if rough else width)
+        if self._links:
+            return LawDerivative.memoryless(
+                slopes.torque, np.zeros_like(slopes.torque[:, self._law.robot.nv_base :])
+            )
         return LawDerivative.memoryless(
-            *_differences(self._law, self._settle, q, theta, 0.0 if rough else width)
+            slopes.torque @ slopes.by_q, slopes.torque @ slopes.by_joints
         )
 
 
 def _differences(
     law: LawEvaluation, function, q: Array, theta: Array, width: float, *, rows: int = 0
 ):
-    """∂f/∂q (k, nv) and ∂f/∂θ (k, n) of function(q, θ, out), by central differences extrapolated to
-    none: (4 D(h/2) − D(h)) / 3; by one-sided ones of `_ROUGH` where the width is 0."""
+    """∂f/∂q (k, nv) and ∂f/∂θ (k, n) of function(q, θ, out), by differences."""
     robot = law.robot
     k, nv, eye = rows or robot.n, robot.nv, np.eye(robot.nv + robot.n)
-    weights = [(_ROUGH, 1.0 / _ROUGH), (0.0, -1.0 / _ROUGH)]
-    if width:
-        near, far = 4.0 / (3.0 * width), 1.0 / (6.0 * width)
-        weights = [(width / 2.0, near), (-width / 2.0, -near), (width, -far), (-width, far)]
     found, out, here = np.zeros((k, nv + robot.n)), np.zeros(k), np.zeros(k)
     function(q, theta, here)
     for i, direction in enumerate(eye):
-        for h, weight in weights:
+        for h, weight in weights(width):
             out[:] = here
             if h:
                 step = h * direction
@@ -286,20 +281,25 @@ class StaticState:
         none = self._law.law.gravity is GravityCompensation.NONE
         return np.zeros_like(carried) if none else carried / self._law.spring_stiffness
 
-    def settled(self, q: Array, theta: Array, out: Array) -> None:
+    def settled(self, q: Array, theta: Array, out: Array, *, nearby: bool = False) -> None:
         """Write the command at q̄ of a state that does not move."""
         law, joints = self._law, self._law.robot.joint_positions(q)
         sag = joints - theta
-        law.follow(q)
+        if not nearby:
+            law.follow(q)
         law.settled(lambda: law.static(q, theta, sag, out), lambda: theta + sag - joints)
 
     def derivative(
         self, q: Array, theta: Array, width: float = STEP, *, rough: bool = False
     ) -> LawDerivative:
-        """Differentiate the settled command."""
-        return LawDerivative.memoryless(
-            *_differences(self._law, self.settled, q, theta, 0.0 if rough else width)
-        )
+        """Differentiate the settled command K (θ − q̄): s = q̄, with K (θ − q̄) = l."""
+        law, K = self._law, np.diag(self._law.spring_stiffness)
+        self.settled(q, theta, np.zeros(law.robot.n))
+        torque, by_q, by_joints = slopes_of(law, q, 0.0 if rough else width)
+        answer = np.linalg.solve(K + torque @ by_joints, np.hstack([-torque @ by_q, K]))
+        C = -K @ answer
+        C[:, law.robot.nv :] += K
+        return LawDerivative.memoryless(C[:, : law.robot.nv], C[:, law.robot.nv :])
 
 
 class TankState:
@@ -345,8 +345,8 @@ class TankState:
         """Return that of q̄(θ)."""
         return self._static.deflection(carried)
 
-    def settled(self, q: Array, theta: Array, out: Array) -> None:
-        """Write the command once x̂ has come to x(q̄(θ))."""
+    def settled(self, q: Array, theta: Array, out: Array, *, nearby: bool = False) -> None:
+        """Write the command once x̂ has come to x(q̄(θ)); `nearby` makes no difference."""
         target = np.zeros(self._law.rows)
         self._target(q, theta, target)
         self._at(q, theta, target, out)
