@@ -235,5 +235,7 @@ def _central(found: Findings) -> str:
     each = ", ".join(f"{row.joint} {row.constant_s * 1e3:.2f} ms" for row in whole)
     return (
         f"With all damping central the exact margin of a held joint is {each} (claim “central "
-        "damping”). An optimal controller is not designed here."
+        "damping”). sealag tune --aim mapping moves such damping into the drives and says what is "
+        "left over; --aim optimal finds the stiffness with the least quadratic index under the "
+        "bound."
     )

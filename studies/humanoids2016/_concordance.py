@@ -21,16 +21,18 @@ class Row(NamedTuple):
 
 ROWS = (
     Row("(1), (2)", "Kinetic energy with the rotors' coupling C(q), potential energy of gravity "
-        "and springs.", "Energy stores of the simulator's audit, without C(q); see Assumption 3."),
-    Row("(3)", "Equations of motion with C(q).", "Not computed: the plant is (4) to (6). The "
-        "error of C(q) ≈ 0 is not a number here."),
+        "and springs.", "Energy stores of the simulator's audit; with C(q) in section “What the "
+        "paper leaves out”."),
+    Row("(3)", "Equations of motion with C(q).", "A second plant integrates (3) with C(q), b_q and "
+        "b_θ beside the first; section “What the paper leaves out”."),
     Row("(4)–(6)", "Links, motors, springs; contact forces F_r.", "The simulator's plant; section "
         "“The loop”. Checked against Pinocchio and MuJoCo in the tests."),
     Row("(7), (8)", "Torque feedback as inertia shaping, embedded damping.", "The simulator's "
         "drive, exact between instants; every certificate's B_s and D_θ."),
     Row("(9)", "(8) in (4).", "Follows; the frozen loop of the exact margin has this form."),
-    Row("(10)", "Task dynamics with Λ, μ, p and F_c.", "Λ and J* as printed. μ is left out, as in "
-        "(11); p is gravity compensation; F_c enters as pushes in the simulation."),
+    Row("(10)", "Task dynamics with Λ, μ, p and F_c.", "Λ and J* as printed; p is gravity "
+        "compensation. Size of μ along the walk, and the plant's answer to F_c against (10): "
+        "section “What the paper leaves out”."),
     Row("(11), (12)", "The delayed law.", "stiffness_form = \"published\", feedback = \"motor\" or "
         "\"static_joint\"; ticked in every simulation of the published law."),
     Row("(13), (14)", "Γ_sea under delay, d_0 = T_H + T_L/2.", "Fig. 5 (lags measured); the same "
@@ -38,35 +40,44 @@ ROWS = (
     Row("(15), (16)", "Equilibrium map θ_0 = h(q_0), l(q).", "q̄(θ) by the same fixed point, with "
         "its contraction factor in “Certified criterion”."),
     Row("(17)", "The law with q̄(θ).", "feedback = \"static_joint\". Its motor-side stiffness is "
-        "not K_q: (29) is unsafe there, section “Where (29) is unsafe”."),
-    Row("(18)–(22)", "Energy tank, u, v_ref and K_b.", "feedback = \"static_joint_tank\", "
-        "tank_flow = \"published\" or \"corrected\"; K_b is the scalar tank_rate, not a matrix. "
-        "The emptying for small ε is a test of the library, not a figure here."),
+        "not K_q: (29) is unsafe there, section “Where (29) is unsafe”. x_d(q̄(t)) is x_d(t) here; "
+        "what a reference of q̄ does stands in “What the paper leaves out”."),
+    Row("(18)–(22)", "Energy tank, u, v_1, v_ref and the matrix K_b; never empty for small ε.",
+        "As printed beside the corrected flow, section “Each subsystem at its own port”; claims “x "
+        "hat” and “tank”. In a project file feedback = \"static_joint_tank\", K_b a scalar."),
     Row("(23)", "∂V_l/∂θ = l: a potential.", "Requires a symmetric stiffness; ΛK_x in general is "
         "not. “Certified criterion” gives the asymmetry."),
-    Row("(24)–(26)", "S_j = V_1: the joint side is passive.", "Passivity observer along the "
-        "simulated walk, section “Energy of the walk”."),
-    Row("(27), (28)", "Derivative of V_2, V_4; the bound on the delayed term.", "The proof in "
-        "docs/theory section 6; (27) drops the gradient of the late ḡ(θ), which the certified "
-        "criterion keeps."),
-    Row("(29), Theorem 1", "Largest delay as an LMI.", "In closed form, “The criteria”; along the "
-        "walk, “Fig. 4”."),
+    Row("(24)–(26)", "S_j = V_1: the joint side is passive at (Γ_sea, q̇_j).", "Observed at that "
+        "port on a leg, claim “subsystems”, and along the walk, section “Energy of the walk”."),
+    Row("(27), (28)", "S_c = V_2 + V_3 + V_4: the controller's side is passive at (q̇_j, −Γ_sea).",
+        "Observed at that port with E_s in V_4, section “Each subsystem at its own port”. (27) "
+        "drops the gradient of the late ḡ(θ), which the certified criterion keeps."),
+    Row("(29), Theorem 1", "Largest delay as an LMI; then passive, and θ̇ bounded.", "In closed "
+        "form, “The criteria”; along the walk, “Fig. 4”; claims “sufficient” and “motor speed”."),
     Row("(30), (31), Corollary 1", "Several priority levels.", "Section “Priority levels”."),
     Row("Assumptions 1, 2", "Rotors symmetric and turning about their own axes.", "The plant has "
         "them."),
-    Row("Assumption 3", "C(q) ≈ 0.", "Assumed throughout; not checked by a plant with C(q)."),
+    Row("Assumption 3", "C(q) ≈ 0.", "Assumed elsewhere; its error over gear ratios in “What the "
+        "paper leaves out”."),
     Row("Assumption 4", "d_1 = T_H + T_L/2 and d_2 have upper bounds.", "Taken from the delays of "
         "the project, with jitter, loss and the hold of the sampled controller."),
-    Row("Remark 1", "Feedback of the torque's derivative.", "Not modelled; spring damping is."),
+    Row("Remark 1", "Feedback of the torque's derivative.", "Spring damping with and without it, "
+        "section “What the paper leaves out”."),
     Row("Remark 2", "ḡ(θ) is gravity at q̄.", "gravity = \"feedback\"; its gradient counts as "
         "stiffness."),
+    Row("Section III, [16]", "Delayed damping hurts more than delayed stiffness.", "Claim “central "
+        "damping”."),
     Row("Figs. 1–3", "Architecture, layers, interconnection.", "Section “The loop”. Model updates "
-        "slower than the controller (Fig. 2) are not an option here."),
+        "slower than the controller (Fig. 2): simulation.model_period_ms and “What the paper "
+        "leaves out”."),
+    Row("Section V", "A 7-step walk of one leg's dynamics, CoM and orientation as the 6-D task.",
+        "Planned and simulated with both legs; the printed law on that very task in “Ablation of "
+        "the walking controller”."),
     Row("Fig. 4", "Largest delay against α and D_θ[0].", "Section “Fig. 4”, over the planned and "
         "the simulated walk."),
     Row("Fig. 5", "Γ_osc and Γ_sea for several β.", "Section “Fig. 5”."),
     Row("Conclusion 1", "More K_x for more D_θ or less delay.", "Claims “stiffness” and “alpha”: "
-        "theorems."),
+        "theorems; “one joint”: as in [22]."),
     Row("Conclusion 2", "D_θ costs torque transparency.", "Claim “damping deviation”."),
     Row("Conclusion 3", "(31) has the smaller range.", "Claim “levels” and section “Priority "
         "levels”."),
@@ -77,7 +88,7 @@ ROWS = (
         "constant delay acts alike on both ways; a varying one need not."),
     Row("Future work (iii)", "Optimal central controller; central against embedded damping.",
         "Claims “central damping”: what it costs to compute damping centrally, and “tuned "
-        "gains”. `sealag tune` has --aim mapping and --aim optimal."),
+        "gains”. sealag tune --aim mapping and --aim optimal; docs/theory, section 16."),
     Row("Future work (iv)", "Experiments; Coulomb friction, torque bandwidth.", "Walks with both, "
         "section “Beyond the paper”. No experiment on hardware."),
 )  # fmt: skip

@@ -82,7 +82,7 @@ def architecture() -> str:
 def layers() -> str:
     """Draw Fig. 2: what is evaluated how often."""
     rows = [
-        ("Model update: J*, Λ, ḡ", "here at every tick of the central controller"),
+        ("Model update: J*, Λ, ḡ", "at every tick, or J*, Λ every model_period_ms"),
         ("Centralised controller (17)", "1 kHz here; sample_time_ms, hold included"),
         ("Channels T_H, T_L", "time-varying; jitter, loss and order may be given"),
         ("Embedded loop (7): torque, damping", "continuous here, or embedded_period_ms"),

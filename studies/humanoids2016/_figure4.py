@@ -10,7 +10,7 @@ from sealag.design import System
 from sealag.passivity import max_delay
 from sealag.robot import Contact, Motion, Robot
 from sealag.simulation import Run
-from sealag.typing import Array, BoolArray
+from sealag.typing import Array, BoolArray, IntArray
 from sealag.whole_body import (
     GravityCompensation,
     MotorAngles,
@@ -166,13 +166,20 @@ def stance_leg(robot: Robot, motion: Motion, spaces: Spaces) -> Array:
         motion: a walk; the first contact is the leg that carries more.
         spaces: the law's matrices along it.
     """
-    leg = np.zeros((len(spaces), spaces.J_star.shape[1], len(LEG)))
-    for index, contacts in enumerate(motion.contact_sets):
-        side = contacts[0].frame.removesuffix("_foot")
-        columns = [robot.joints.index(f"{side}_{name}") for name in LEG]
-        where = motion.contact_index == index
-        leg[where] = spaces.J_star[where][:, :, columns]
-    return leg
+    columns = stance_columns(robot, motion)
+    return np.take_along_axis(spaces.J_star, columns[:, None, :], axis=2)
+
+
+def stance_columns(robot: Robot, motion: Motion) -> IntArray:
+    """Return the joints of the stance leg at each instant, (N, 3) indices.
+
+    Args:
+        robot: Hume.
+        motion: a walk; the first contact is the leg that carries more.
+    """
+    sides = [contacts[0].frame.removesuffix("_foot") for contacts in motion.contact_sets]
+    each = np.array([[robot.joints.index(f"{side}_{name}") for name in LEG] for side in sides])
+    return each[motion.contact_index]
 
 
 def _certified(

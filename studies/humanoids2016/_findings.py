@@ -10,7 +10,12 @@ from humanoids2016._figure4 import Figure4
 from humanoids2016._figure5 import BETAS, TorqueTrace
 from humanoids2016._levels import LevelTable
 from humanoids2016._live import LiveLeg
+from humanoids2016._ports import PortRow, TankRow
 from humanoids2016._random_table import RandomPlantTable
+from humanoids2016._rotors import RATIOS, RotorTable
+from humanoids2016._slow_model import PERIODS, SlowModel
+from humanoids2016._task_terms import ReferenceRow, TaskTerms
+from humanoids2016._torque_rate import TorqueRateRow
 from humanoids2016._unsafe import UnsafeExample
 from humanoids2016._walk import Walk
 from humanoids2016._walk_table import WalkRow
@@ -34,6 +39,10 @@ class StudySize:
         stiffnesses: spring stiffnesses of the delay map, Nm/rad.
         scales: factors on the delays in the delay map, increasing.
         betas: values of β = B_s / B in Fig. 5.
+        leg_time: of a frozen leg's runs, s.
+        swing_time: of a leg's swing with coupled rotors, s.
+        ratios: gear ratios of these.
+        periods: of a model that is updated slowly, s; the first is its reference.
         jobs: number of processes.
     """
 
@@ -47,6 +56,10 @@ class StudySize:
     stiffnesses: tuple[float, ...] = STIFFNESSES
     scales: tuple[float, ...] = SCALES
     betas: tuple[float, ...] = BETAS
+    leg_time: float = 6.0
+    swing_time: float = 1.0
+    ratios: tuple[float, ...] = RATIOS
+    periods: tuple[float, ...] = PERIODS
     jobs: int = 2
 
 
@@ -61,6 +74,10 @@ QUICK = StudySize(
     stiffnesses=(350.0,),
     scales=(1.0, 6.0),
     betas=(0.5,),
+    leg_time=0.4,
+    swing_time=0.1,
+    ratios=RATIOS[1:2],
+    periods=(0.0, 0.1),
 )
 """A page with few cases, in some two minutes of one core."""
 
@@ -91,6 +108,14 @@ class Findings:
         levels: one priority level against two.
         damping: damping in the drive against damping in the controller.
         live: matrices for the reader's own gains.
+        ports: both subsystems at the paper's own ports.
+        tanks: how long the energy tank lasts.
+        printed: success of the printed law on the printed task.
+        slow: a model that is updated slowly.
+        rotors: the error of Assumption 3.
+        terms: sizes of μ and F_c.
+        references: references that are functions of q̄.
+        torque_rates: spring damping, and feedback of the torque's derivative.
         certificate: over the planned walk, with the bound for matrices that vary in time.
         claims: statements of the paper, checked.
     """
@@ -116,5 +141,13 @@ class Findings:
     levels: LevelTable
     damping: tuple[SplitDamping, ...]
     live: LiveLeg
+    ports: tuple[PortRow, ...]
+    tanks: tuple[TankRow, ...]
+    printed: tuple[WalkRow, ...]
+    slow: tuple[SlowModel, ...]
+    rotors: RotorTable
+    terms: TaskTerms
+    references: tuple[ReferenceRow, ...]
+    torque_rates: tuple[TorqueRateRow, ...]
     certificate: Certificate
     claims: tuple[Claim, ...]

@@ -17,8 +17,10 @@ from humanoids2016._concordance import concordance_section
 from humanoids2016._figure4 import Figure4
 from humanoids2016._figure5 import TorqueTrace
 from humanoids2016._findings import Findings
+from humanoids2016._left_out_page import left_out_section
 from humanoids2016._page import Article, Block, Cell, Figure, Raw, Section, Table, Text
 from humanoids2016._plots import plot_figure_4, plot_levels, plot_walk_bounds
+from humanoids2016._ports_page import ports_section
 from humanoids2016._random_table import RandomPlantTable
 from humanoids2016._unsafe import UnsafeExample
 from humanoids2016._walk_page import energy_section, means_section, walk_section
@@ -64,6 +66,8 @@ def write_paper_page(
         _criteria_section(),
         _live_section(found),
         *_bound_sections(found),
+        ports_section(found),
+        left_out_section(found),
         walk_section(found),
         means_section(found),
         energy_section(found),

@@ -19,8 +19,16 @@ from humanoids2016._figure5 import figure_5, figure_5_claims
 from humanoids2016._findings import QUICK, Findings, StudySize
 from humanoids2016._levels import level_claim, level_table
 from humanoids2016._live import live_leg
+from humanoids2016._one_joint import one_joint_claim, one_joint_grids
 from humanoids2016._paper_page import write_paper_page
+from humanoids2016._ports import port_claims, port_table, stance_legs, tank_table
+from humanoids2016._printed_task import printed_rows
+from humanoids2016._progress import Progress
 from humanoids2016._random_table import random_plant_table
+from humanoids2016._rotors import rotor_table
+from humanoids2016._slow_model import slow_models
+from humanoids2016._task_terms import reference_rows, task_terms
+from humanoids2016._torque_rate import torque_rate_rows
 from humanoids2016._tuned_walk import tuned_claim, tuned_walk
 from humanoids2016._unsafe import unsafe_examples
 from humanoids2016._walk import WalkCase, simulate_walk, walking_of
@@ -39,6 +47,22 @@ from sealag.files import make_folder
 from sealag.report import write_run
 from sealag.robot import Motion
 from sealag.walking import WalkPlan
+
+STAGES: Mapping[str, float] = {
+    "planning the walk and its whole-body motion": 4.0,
+    "Fig. 4 at every instant of the plan": 10.0,
+    "both criteria against the exact delay margin": 45.0,
+    "each subsystem at its port, and the energy tank": 25.0,
+    "the walk in closed loop under delay": 7.0,
+    "what the paper leaves out: slow models, C(q), μ, F_c, x_d(q̄)": 22.0,
+    "walks over random terrains, with and without noise and model errors": 50.0,
+    "walks with each means left out, and the printed law on the printed task": 20.0,
+    "Fig. 5: walks with several β, D_θ and K": 8.0,
+    "priority levels, central damping, a certificate of the whole walk": 40.0,
+    "each means left out over springs, α, β and delays": 40.0,
+    "gains, delays, stairs, pushes and drives": 60.0,
+}
+"""What is computed, and how many seconds it takes on two idle processors."""
 
 
 def reproduce(
@@ -67,7 +91,6 @@ def reproduce(
     make_folder(out)
     found = study(project, QUICK if quick else StudySize(), progress=progress)
     system, walk = found.system, found.walk
-    progress("[7/7] writing the page")
     system.save_motion(found.motion, out / "walk.csv")
     write_run(walk.run, system.robot, out / "walk.mcap", project=system.text, version=VERSION)
     page = write_paper_page(out, found, version=VERSION)
@@ -116,44 +139,59 @@ def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> 
         InputError: the project has no [walking] section, or its robot is not Hume.
     """
     system = _hume(project)
-    walking = walking_of(system)
-    progress(f"[1/7] planning {walking.steps} steps and their whole-body motion")
+    walking, stages = walking_of(system), Progress(STAGES, progress)
+    stages.begin("planning the walk and its whole-body motion")
     motion = planned_walk(system, rate=size.rate)
-    progress(f"[2/7] Fig. 4 over {len(motion)} instants")
+    live = live_leg(system, motion)
+    stages.begin("Fig. 4 at every instant of the plan")
     figure = figure_4(system, motion)
-    progress("[3/7] published and certified criterion against the exact delay margin")
+    stages.begin("both criteria against the exact delay margin")
     unsafe, table = unsafe_examples(draws=size.draws), random_plant_table(size.plants)
-    progress(f"[4/7] walking {walking.steps} steps in closed loop under delay")
+    stages.begin("each subsystem at its port, and the energy tank")
+    ports = port_table(live, duration=size.leg_time)
+    tanks = tank_table(live, duration=size.leg_time)
+    stages.begin("the walk in closed loop under delay")
     walk = simulate_walk(system)
+    simulated = figure_4(system, simulated_motion(walk.run))
+    stages.begin("what the paper leaves out: slow models, C(q), μ, F_c, x_d(q̄)")
+    slow = slow_models(system, motion, periods=size.periods)
+    rotors = rotor_table(system, walk, live, ratios=size.ratios, swing_time=size.swing_time)
 
     def tabulate(cases: Mapping[str, WalkCase], count: int, first: int = 0) -> tuple[WalkRow, ...]:
         grounds = rough_grounds(count, first=first)
         return walk_success(_some(cases, size), grounds, project=project, jobs=size.jobs)
 
-    progress("[5/7] walking over random terrains, with and without noise and model errors")
+    stages.begin("walks over random terrains, with and without noise and model errors")
     robust = tabulate(robustness_cases(walking), size.grounds)
     longer = replace(walking, steps=size.held_out_steps)
     held_out = tabulate(robustness_cases(longer), size.grounds, HELD_OUT)
-    progress("[6/7] leaving out each means, varying gains and delays, stairs, pushes; Fig. 5")
+    stages.begin("walks with each means left out, and the printed law on the printed task")
     ablations = tabulate(ablation_cases(walking), size.few_grounds)
+    printed = printed_rows(rough_grounds(size.few_grounds), project=project, jobs=size.jobs)
+    stages.begin("Fig. 5: walks with several β, D_θ and K")
     traces = figure_5(betas=size.betas, project=project, jobs=size.jobs)
     published = next(row for row in ablations if row.name == PUBLISHED_LAW)
-    few = (size.few_grounds + 1) // 2
+    stages.begin("priority levels, central damping, a certificate of the whole walk")
     levels, damping = level_table(system, motion), split_damping(system)
+    certificate = certify(system, motion, time_varying=True)
+    few = (size.few_grounds + 1) // 2
+    stages.begin("each means left out over springs, α, β and delays")
+    everywhere = ablation_table(
+        rough_grounds(few), project=project, most=size.cases, jobs=size.jobs
+    )
+    stages.begin("gains, delays, stairs, pushes and drives")
     return Findings(
         system=system,
         motion=motion,
         figure=figure,
-        simulated=figure_4(system, simulated_motion(walk.run)),
+        simulated=simulated,
         unsafe=unsafe,
         table=table,
         walk=walk,
         robust=robust,
         held_out=held_out,
         ablations=ablations,
-        everywhere=ablation_table(
-            rough_grounds(few), project=project, most=size.cases, jobs=size.jobs
-        ),
+        everywhere=everywhere,
         gait=tabulate(gait_cases(walking), size.few_grounds),
         gains=tabulate(gain_cases(walking, system.delays), size.few_grounds),
         delays=delay_map(
@@ -172,14 +210,24 @@ def study(project: str, size: StudySize, *, progress: Callable[[str], None]) -> 
         bandwidth_refusal=bandwidth_refusal(system),
         levels=levels,
         damping=damping,
-        live=live_leg(system, motion),
-        certificate=certify(system, motion, time_varying=True),
+        live=live,
+        ports=ports,
+        tanks=tanks,
+        printed=printed,
+        slow=slow,
+        rotors=rotors,
+        terms=task_terms(system, walk),
+        references=reference_rows(live),
+        torque_rates=torque_rate_rows(live),
+        certificate=certificate,
         claims=(
             *figure_4_claims(figure, table),
+            *port_claims(ports, tanks),
             *figure_5_claims(traces),
             level_claim(levels),
             split_claim(damping),
             tuned_claim(tuned_walk(system, walk), system.robot.joints),
+            one_joint_claim(one_joint_grids(stance_legs(live)[0])),
             walk_claim(robust, published),
         ),
     )

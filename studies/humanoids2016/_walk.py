@@ -1,7 +1,7 @@
 """One closed-loop walk: a project's [walking] section with other gains, errors and delays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -130,6 +130,24 @@ class Walk:
     run: Run
     gait: MeasuredGait
     task: Array
+
+    def summary(self) -> Self:
+        """Drop what a table does not need, so that processes exchange little."""
+        run = replace(_emptied(self.run), events=())
+        gait = replace(self.gait, com=np.zeros((0, 3)))
+        return replace(self, run=run, gait=gait, task=np.zeros((0, 3)))
+
+
+def _emptied(value: Any) -> Any:
+    """Return a value whose arrays, at any depth, have no rows."""
+    if isinstance(value, np.ndarray):
+        return value[:0].copy()
+    if isinstance(value, dict):
+        return {key: _emptied(part) for key, part in value.items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = {part.name: _emptied(getattr(value, part.name)) for part in fields(value)}
+        return replace(value, **parts)
+    return value
 
 
 def simulate_walk(system: System, case: WalkCase | None = None) -> Walk:

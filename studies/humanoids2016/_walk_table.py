@@ -1,7 +1,7 @@
 """Success tables of the walk: terrains, gains, delays."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -98,7 +98,7 @@ def walk_success(
     walks: list[Any]
     if jobs == 1:
         system = load(project)
-        walks = [_summary(simulate_walk(system, case)) for _, case in work]
+        walks = [simulate_walk(system, case).summary() for _, case in work]
     else:
         walks = list(in_parallel(_walk, work, jobs=jobs))
     count = 1 if grounds is None else len(grounds)
@@ -112,26 +112,7 @@ _SYSTEMS: dict[str, System] = {}
 def _walk(project: str, case: WalkCase) -> Walk:
     if project not in _SYSTEMS:
         _SYSTEMS[project] = load(project)
-    return _summary(simulate_walk(_SYSTEMS[project], case))
-
-
-def _summary(walk: Walk) -> Walk:
-    """Drop what a table does not need, so that processes exchange little."""
-    empty = np.zeros((0, 3))
-    run = replace(_emptied(walk.run), events=())
-    return replace(walk, run=run, gait=replace(walk.gait, com=empty), task=empty)
-
-
-def _emptied(value: Any) -> Any:
-    """Return a value whose arrays, at any depth, have no rows."""
-    if isinstance(value, np.ndarray):
-        return value[:0].copy()
-    if isinstance(value, dict):
-        return {key: _emptied(part) for key, part in value.items()}
-    if is_dataclass(value) and not isinstance(value, type):
-        parts = {part.name: _emptied(getattr(value, part.name)) for part in fields(value)}
-        return replace(value, **parts)
-    return value
+    return simulate_walk(_SYSTEMS[project], case).summary()
 
 
 def rough_grounds(

@@ -160,7 +160,7 @@ CHANGES: list[tuple[str, dict[str, Any], Any]] = [
     ("motion.file", {"motion": {"file": "one.csv"}}, "other.csv"),
     *((f"simulation.{key}", {}, value) for key, value in (
         ("scenario", "track"), ("duration_s", 3.0), ("physics_step_ms", 0.1),
-        ("log_period_ms", 20.0), ("friction", 0.5),
+        ("log_period_ms", 20.0), ("model_period_ms", 20.0), ("friction", 0.5),
         ("foot_radius", 0.02), ("foot_half_length", 0.2), ("foot_half_width", 0.2),
         ("torsional_damping", 1.0), ("torsional_radius", 0.1), ("drop_height", 0.1),
         ("track_amplitude", 0.1), ("track_frequency_hz", 2.0), ("seed", 4),

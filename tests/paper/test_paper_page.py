@@ -81,7 +81,8 @@ def test_page_needs_no_network_and_holds_the_numbers(written):
     links.feed(text)
     assert links.outside == []
     assert set(links.anchors) >= {
-        "claims", "loop", "criteria", "live", "figure4", "certified", "levels", "unsafe", "walk",
+        "claims", "loop", "criteria", "live", "figure4", "certified", "levels", "unsafe", "ports",
+        "left-out", "walk",
         "means", "energy", "limits", "figure5", "beyond", "assumptions", "rows",
     }  # fmt: skip
     assert set(links.anchors) <= set(links.ids)
@@ -102,7 +103,7 @@ def test_page_needs_no_network_and_holds_the_numbers(written):
     assert "T_H of 20 ms in the mean and 30 ms at most" in text
     tables = {path.stem: path.read_text() for path in (out / "tables").iterdir()}
     assert text.count("<table") == len(tables)
-    assert "no lead,4 / 1,3 / 1,2 / 0" in tables["means_2"]
+    assert "no lead,4 / 1,3 / 1,2 / 0" in tables["means_3"]
     torques = np.genfromtxt(out / "figure5.csv", delimiter=",", names=True)
     expected = traces[-1].achieved[::2][-1, 0]
     assert torques[f"spring_{walk.run.joints[0]}_nm"][-1] == pytest.approx(expected, rel=1e-8)

@@ -207,6 +207,28 @@ class TestPassivityObserver:
         assert not run.audit.delay_side.passive
         assert run.audit.joint_side.passive  # springs and motors are, whatever drives them
 
+    @pytest.mark.parametrize(("delay", "passive"), [(0.06, True), (0.3, False)])
+    def test_the_paper_s_ports_lie_at_the_links(self, tmp_path, delay, passive):
+        """S_j = V_1 at (τ_sea, q̇), S_c at (q̇, −τ_sea): from the log alone, Eqs. (25)-(28)."""
+        run = self._run(tmp_path, delay, duration=1.0 if passive else 3.0)
+        audit, q_dot = run.audit, run.v[:, 0]
+        given = np.append(0.0, np.cumsum(0.5 * np.diff(run.q[:, 0]) * (
+            run.tau_sea[1:, 0] + run.tau_sea[:-1, 0])))  # fmt: skip
+        V_1 = 0.5 * 1.0 * q_dot**2 + audit.stores["gravity"]
+        V_2 = 0.5 * 0.09 * run.theta_dot[:, 0] ** 2 + run.tau_sea[:, 0] ** 2 / (2.0 * 350.0)
+        S_c = V_2 + 0.5 * 100.0 * run.theta[:, 0] ** 2
+        rough = 1e-3 * np.abs(given).max()
+        np.testing.assert_allclose(audit.joint_port.slack, given - V_1 + V_1[0], atol=rough)
+        np.testing.assert_allclose(audit.controller_port.slack, S_c[0] - S_c - given, atol=rough)
+        assert audit.joint_port.passive  # links are, whatever drives them
+        assert audit.controller_port.passive == passive
+        # with ideal drives the springs only pass on what the other port lets through
+        np.testing.assert_allclose(
+            audit.controller_port.slack, audit.controller_side.slack, atol=1e-6
+        )
+        if not passive:
+            assert audit.controller_port.joint == "joint0"
+
     def test_the_work_of_a_push_is_nobody_s_activity(self, tmp_path):
         """The joint side stores what a push gives; without that in its books it looks active."""
         robot = planar_arm(tmp_path, count=2, mass=1.0, inertia=0.05, length=0.4)
@@ -227,6 +249,8 @@ class TestPassivityObserver:
         assert given.max() > 0.1
         assert run.audit.joint_side.passive
         assert run.audit.joint_side.slack[-1] < given[-1], "its slack holds the push's work"
+        assert run.audit.joint_port.passive
+        assert run.audit.joint_port.slack[-1] < given[-1]
 
     @pytest.mark.parametrize("guilty", [0, 1])
     def test_the_joint_that_delivers_is_named(self, tmp_path, guilty):

@@ -184,6 +184,8 @@ def _show(run: Run, answer: dict[str, Any], scenario: str) -> None:
         "joint side": books.joint_side,
         "controller side": books.controller_side,
         "delay and damping": books.delay_side,
+        "links, S_j at q̇_j": books.joint_port,
+        "the rest, S_c at q̇_j": books.controller_port,
     }
     for name, side in sides.items():
         if side is not None:

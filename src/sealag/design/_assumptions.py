@@ -209,7 +209,8 @@ def _of_contacts(system: Design) -> Iterator[tuple[str, str]]:
     yield (
         "simulation",
         "[simulation] changes a run, not the loop: scenario, duration_s, physics_step_ms, "
-        "log_period_ms, seed, pushes (frame, force_n, start_s, duration_s), drop_height, "
+        "log_period_ms, model_period_ms (bound and margin update J* and S at every tick), seed, "
+        "pushes (frame, force_n, start_s, duration_s), drop_height, "
         "track_amplitude, track_frequency_hz, and of the feet friction, foot_radius, "
         "foot_half_length, foot_half_width, torsional_damping and torsional_radius.",
     )

@@ -276,19 +276,24 @@ class Design:
         posture: ArrayLike | None = None,
         *,
         reference: Callable[[float], tuple[Array, Array]] | None = None,
+        model_period: float = 0.0,
     ) -> TickController:
         """Return the controller that runs: the law's `Controller`, or what the program makes.
 
         Args:
             posture: (nq,) configuration that it holds; the system's if None.
             reference: offset (m,) of the references and its rate (m,) at a time.
+            model_period: s between two updates of J* and S; 0 updates them at each tick.
 
         Raises:
-            InputError: a program is asked for another posture or for a moving reference.
+            InputError: a program is asked for another posture, for a moving reference or for a
+                slow model.
         """
         if self.program is not None:
             if reference is not None or posture is not None:
                 self.require_law("A posture of its own and a moving reference are")
+            if model_period > 0.0:
+                self.require_law("A model with a rate of its own (simulation.model_period_ms) is")
             return self.program(self)
         return Controller(
             self.robot,
@@ -298,6 +303,7 @@ class Design:
             posture=self.posture if posture is None else posture,
             delay_bound=self.delays.d_1,
             reference=reference,
+            model_period=model_period,
         )
 
     def _held(self, motion: Motion | None, instant: int) -> tuple[Array, tuple[Contact, ...]]:

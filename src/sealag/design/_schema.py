@@ -372,6 +372,7 @@ class SimulationSection(Section):
     duration_s: Duration = 2.0
     physics_step_ms: Annotated[FiniteFloat, _within(1e-3, 10, "ms")] | None = None
     log_period_ms: Annotated[FiniteFloat, _within(1e-3, 1e6, "ms")] | None = None
+    model_period_ms: Annotated[FiniteFloat, _within(0, 1e6, "ms")] = 0.0
     friction: Friction = 0.8
     foot_radius: LengthOrZero = 0.0
     foot_half_length: Length = 0.1

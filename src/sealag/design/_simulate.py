@@ -86,6 +86,7 @@ def simulate(
         "progress": progress,
     }
     if kind == "walk" or (kind == "balance" and system.walking is not None):
+        _refuse_slow_model(system)
         walking = system.required_walking()
         walking = walking if kind == "walk" else _on_the_spot(walking)
         return _walk(system, walking, _pushes(system, kind), common)
@@ -107,6 +108,16 @@ def simulate(
         **common,
     )
     return _with_delay_storage(run, system, held)
+
+
+def _refuse_slow_model(system: Design) -> None:
+    """A walk's law has no matrices that could be held."""
+    if system.simulation.model_period_ms > 0.0:
+        raise InputError(
+            "simulation.model_period_ms holds the matrices of the law of [[tasks]]; the law of "
+            "[walking], which this scenario runs, has none. Leave it out, or choose another "
+            "scenario (regulate, track, drop)."
+        )
 
 
 def _start(system: Design, kind: str, held: Array) -> tuple[Array, Array | None]:
@@ -166,8 +177,9 @@ class _Tracking:
 
 def _controller(system: Design, kind: str, q: Array) -> TickController:
     """The design's controller, holding where it stands or tracking about it."""
+    slow = seconds_from_ms(system.simulation.model_period_ms)
     if kind != "track":
-        return system.controller(None if system.program is not None else q)
+        return system.controller(None if system.program is not None else q, model_period=slow)
     m = system.law.levels(system.robot)[-1]
     w = 2.0 * math.pi * system.simulation.track_frequency_hz
     size, row = system.simulation.track_amplitude, np.eye(m)[0]
@@ -175,7 +187,7 @@ def _controller(system: Design, kind: str, q: Array) -> TickController:
     def wave(t: float) -> tuple[Array, Array]:
         return size * (1.0 - math.cos(w * t)) / 2.0 * row, size * w * math.sin(w * t) / 2.0 * row
 
-    return _Tracking(system.controller(q, reference=wave))
+    return _Tracking(system.controller(q, reference=wave, model_period=slow))
 
 
 def _feet(system: Design) -> list[Foot]:

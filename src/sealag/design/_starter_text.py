@@ -78,6 +78,7 @@ OPTIONAL = """\
 # duration_s = 2.0
 # physics_step_ms = 0.5        # as fine as the fastest spring needs, at most 1, if left out
 # log_period_ms = 20.0         # between two logged instants; the controller's period if left out
+# model_period_ms = 0.0        # at which J* and the task inertia are updated; 0: at every tick
 # friction = 0.8               # of the ground
 # foot_radius = 0.0            # m
 {soles}

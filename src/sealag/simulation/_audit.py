@@ -5,11 +5,19 @@ of the motor motion (motors, springs) and Runge-Kutta integrals of powers (conta
 is a remainder, so that the residual measures the integrator and the books.
 
 Passivity at the port between embedded and central side, (tau_osc - D_theta θ̇, θ̇), with the shaped
-rotor inertia B_s as in the storage function S_j = V_1:
+rotor inertia B_s in the joint side's storage S_j:
 
 - joint side:      ∫(τ_osc - D_θ θ̇)ᵀθ̇ dt + disturbances - (S_j - S_j(0)) >= 0,
 - controller side: -∫(τ_osc - D_θ θ̇)ᵀθ̇ dt - (V_3 - V_3(0)) >= 0, the slack being V_4 (what the
   delay line stores) and what was dissipated.
+
+The paper closes the loop elsewhere, at the links, Eqs. (25)-(28) and Fig. 3:
+
+- S_j = V_1 = kinetic + gravity at (τ_sea, q̇_j): ∫τ_seaᵀq̇_j dt + disturbances - (S_j - S_j(0)) >= 0;
+  the contacts' work, which V_1 integrates, is 0 where feet stick and else part of the slack,
+- S_c = V_2 + V_3 + V_4 at (q̇_j, -τ_sea), V_2 = springs + ½ θ̇ᵀB_sθ̇ and the tank's energy in V_4:
+  -∫τ_seaᵀq̇_j dt - (S_c - S_c(0)) >= 0, the slack being what the delay line stores in V_4 and what
+  was dissipated, as for the controller side above.
 
 What the command gives besides V_3 has two sources. The delay's, ∫(τ_osc - τ_now)ᵀdθ with τ_now
 the undelayed command, is what a certificate bounds: it stays below ∫D_θ θ̇² dt. The law's own,
@@ -26,7 +34,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sealag.kernels import keep
-from sealag.kernels.ledger import DISTURBANCE, JOINT_FLOWS, MOTOR_STORE, SCALAR_FLOWS, STORES
+from sealag.kernels.ledger import (
+    DISTURBANCE,
+    JOINT_FLOWS,
+    SCALAR_FLOWS,
+    SPRING_STORE,
+    STORES,
+)
 from sealag.simulation._ledger import residual
 from sealag.store import Store, blocks, release
 from sealag.typing import Array
@@ -102,6 +116,9 @@ class Audit:
             no storage function.
         delay_side: Passivity of delay and damping alone: what a certificate promises, for
             coefficients that move too; None like ``delay_injection``.
+        joint_port: Passivity of links and contacts alone, S_j = V_1 at (τ_sea, q̇_j), Eq. (26).
+        controller_port: Passivity of springs, motors, delay and controller, S_c at (q̇_j, −τ_sea),
+            Eq. (28); None if the controller states no storage function.
     """
 
     time: Array
@@ -121,6 +138,23 @@ class Audit:
     joint_side: Passivity
     controller_side: Passivity | None
     delay_side: Passivity | None
+    joint_port: Passivity
+    controller_port: Passivity | None
+
+    @property
+    def V_3(self) -> Array | None:
+        """The task's potential (N,), J; None if the controller states none."""
+        if self.controller_storage is None or self.tank is None:
+            return self.controller_storage
+        return self.controller_storage - self.tank
+
+    @property
+    def V_4(self) -> Array | None:
+        """What delay line and energy tank store (N,), J, as the paper books it; None without a
+        certificate of the run's design."""
+        if self.delay_storage is None or self.tank is None:
+            return self.delay_storage
+        return self.delay_storage + self.tank
 
     @property
     def closure(self) -> float:
@@ -217,13 +251,19 @@ def audit(
     """
     stores, joint, scalar, throughput = books
     flows = {name: joint[:, k] for k, name in enumerate(JOINT_FLOWS)}
-    command, damping = flows["command"], flows["damping"]
-    error, shaping, slack = (store.zeros(len(time)) for _ in range(3))
-    s_0 = 0.0
+    command, damping, port = flows["command"], flows["damping"], flows["port"]
+    error, shaping, slack, of_links, of_springs = (store.zeros(len(time)) for _ in range(5))
+    s_0 = v_1_0 = v_2_0 = 0.0
     for rows in blocks(len(time)):
         drive = command[rows] - damping[rows]
-        s_j = stores[rows, :MOTOR_STORE].sum(axis=1) + 0.5 * theta_dot[rows] ** 2 @ shaped_inertia
-        s_0 = s_j[0] if rows.start == 0 else s_0
+        v_1 = stores[rows, :SPRING_STORE].sum(axis=1)
+        v_2 = stores[rows, SPRING_STORE] + 0.5 * theta_dot[rows] ** 2 @ shaped_inertia
+        s_j = v_1 + v_2
+        if rows.start == 0:
+            s_0, v_1_0, v_2_0 = s_j[0], v_1[0], v_2[0]
+        given = port[rows].sum(axis=1)
+        of_links[rows] = given + scalar[rows, DISTURBANCE] - (v_1 - v_1_0)
+        of_springs[rows] = -given - (v_2 - v_2_0)
         error[rows] = residual(stores[rows], joint[rows], scalar[rows], stores[:1].sum())
         shaping[rows] = (flows["motor_work"][rows] - ratio * drive).sum(axis=1)
         slack[rows] = drive.sum(axis=1) + scalar[rows, DISTURBANCE] - (s_j - s_0)
@@ -231,7 +271,7 @@ def audit(
     spent = float(np.abs(error).max(initial=0.0))
     moved = float(throughput[-1]) if time.size else 0.0
     tolerance = 2.0 * spent + _ROUNDING * (moved + _largest(stores))
-    control = delay = injection = own = None
+    control = delay = injection = own = at_port = None
     if stated is not None:
         work, potential = stated.work, stated.storage
         of_law = tolerance + _ROUNDING * _largest(potential[:, None])
@@ -242,10 +282,12 @@ def audit(
             own[rows] = given + potential[rows] - potential[:1]
             of_delay[rows] = damping[rows].sum(axis=1) - injection[rows]
             of_control[rows] = of_delay[rows] - own[rows]
+            of_springs[rows] -= potential[rows] - potential[:1]
             release(joint, work)
         control = _observe(
             time, of_control, lambda row: command[row] - damping[row], joints, of_law
         )
+        at_port = _observe(time, of_springs, lambda row: port[row], joints, of_law)
         delay = _observe(
             time, of_delay, lambda row: command[row] - work[row] - damping[row], joints,
             of_law + stated.rough,
@@ -270,6 +312,8 @@ def audit(
         ),
         controller_side=control,
         delay_side=delay,
+        joint_port=_observe(time, of_links, lambda row: -port[row], joints, tolerance),
+        controller_port=at_port,
     )
 
 

@@ -206,6 +206,7 @@ class Run:
         """
         books = self.audit
         joint, central, delay = books.joint_side, books.controller_side, books.delay_side
+        at_port = books.controller_port
         return {
             "outcome": self.outcome.value,
             "message": self.message,
@@ -224,6 +225,8 @@ class Run:
             "controller_side_slack_j": float(central.slack.min()) if central else None,
             "first_violation_s": central.first_violation if central else None,
             "violating_joint": central.joint if central else None,
+            "joint_port_passive": books.joint_port.passive,
+            "controller_port_passive": at_port.passive if at_port else None,
             "delay_side_passive": delay.passive if delay else None,
             "delay_side_slack_j": float(delay.slack.min()) if delay else None,
             "delay_injection_j": _largest(books.delay_injection),
@@ -260,6 +263,8 @@ def _works(run: Run, rows: slice) -> dict[str, Array]:
         "joint_side_slack": books.joint_side,
         "controller_side_slack": books.controller_side,
         "delay_side_slack": books.delay_side,
+        "joint_port_slack": books.joint_port,
+        "controller_port_slack": books.controller_port,
     }
     named = {
         **books.scalar_flows,

@@ -8,6 +8,7 @@ from sealag.actuation import Actuators
 from sealag.robot import Contact, Robot
 from sealag.typing import Array, ArrayLike
 from sealag.whole_body._evaluation import LawEvaluation
+from sealag.whole_body._held_model import HeldModel
 from sealag.whole_body._law import Law
 from sealag.whole_body._protocol import Measurement
 from sealag.whole_body._tasks import GravityCompensation
@@ -32,6 +33,7 @@ class Controller:
         posture: ArrayLike,
         delay_bound: float = 0.0,
         reference: Callable[[float], tuple[Array, Array]] | None = None,
+        model_period: float = 0.0,
     ) -> None:
         """Prepare a controller that holds a posture, or follows a reference about it.
 
@@ -45,14 +47,16 @@ class Controller:
             delay_bound: d̄ that an energy tank pays for, s.
             reference: returns offset (m,) of the references and its rate (m,) at a time, for all
                 rows by priority; None holds still.
+            model_period: s between two updates of J* and S, which are held in between; 0 updates
+                them at each tick.
 
         Raises:
-            InputError: the posture has another shape.
+            InputError: the posture has another shape, or an energy tank is to hold its matrices.
             UnknownNameError: a frame or joint does not exist.
             RobotError: the mass matrix at the posture is not positive definite.
         """
         self._motor_damping, self._reference = actuators.motor_damping, reference
-        self._stated = law
+        self._stated, self._model = law, HeldModel(model_period, law.signal)
         self._law = LawEvaluation(
             robot, law, actuators.spring_stiffness, contacts=contacts, posture=posture
         )
@@ -76,6 +80,7 @@ class Controller:
             t: first instant, s.
             measurement: the state then.
         """
+        self._model.reset()
         self._signal.reset(t, measurement)
 
     def tick(self, t: float, measurement: Measurement, out: Array) -> None:
@@ -94,6 +99,8 @@ class Controller:
         rate = self._refer(t)
         self._signal.command(t, measurement, out)
         self._law.keep_following()
+        self._model.update(t, self._law.space)
+        self._model.replace(self._law.space, self._law.error, out)
         if rate is not None:
             rate = np.array(rate, dtype=float)
             self._law.leave_to_higher(rate)
@@ -120,6 +127,10 @@ class Controller:
         """
         self._refer(t)
         energy, joints = self._signal.present(measurement, command)
+        fresh = command / self._law.spring_stiffness * command
+        energy += self._model.replace(self._law.space, self._law.error, command)
+        if self.law.signal.rests_at_posture:  # V_3 of q̄(θ) holds −½ lᵀ K⁻¹ l
+            energy += 0.5 * float((fresh - command / self._law.spring_stiffness * command).sum())
         match self.law.gravity:
             case GravityCompensation.PLANNED:
                 energy -= float(self._law.planned_gravity.dot(joints))
