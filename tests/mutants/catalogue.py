@@ -547,7 +547,7 @@ MUTANTS = [
         ("q[2] += system.simulation.drop_height", "pass", "height of a drop"),
         ("radius=setting.foot_radius", "radius=0.0", "radius of the feet"),
         ("if push.start_s >= length:", "if False:", "pushes that never act"),
-        ("clock = replace(_clock(system), log=log_period)", "clock = _clock(system)",
+        ("clock = replace(clock_of(system), log=log_period)", "clock = clock_of(system)",
          "the log's period"),
         ("w = 2.0 * math.pi * system.simulation.track_frequency_hz",
          "w = system.simulation.track_frequency_hz", "frequency of the reference"),

@@ -8,29 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from sealag.design._clock import clock_of
 from sealag.design._design import Design
 from sealag.design._project import loaded
 from sealag.design._schema import SCENARIOS
 from sealag.design._system import System
 from sealag.errors import InputError, either
 from sealag.robot import ContactKind
-from sealag.simulation import Clock, Foot, MeasuredGait, Network, Push, Run, Scene, closed_loop
+from sealag.simulation import Foot, Network, Push, Run, Scene, closed_loop
 from sealag.typing import Array
 from sealag.units import seconds_from_ms
 from sealag.walking import GroundProfile, Walking
 from sealag.whole_body import TaskKind, TickController
 
-LONGEST_STEP = 1e-3
-"""Longest physics step, s."""
-SHORTEST_STEP = 1e-5
-"""Shortest physics step that is chosen where the project states none, s."""
 LONGEST_RUN = 1e9
 """s."""
-STEPS_PER_SWING = 8
-"""Least number of physics steps in a period of the fastest spring."""
-FINER = 4
-"""How many times finer a step may become to divide the delays."""
-
 _SPOT_SPEED = 1e-3  # m/s
 
 
@@ -84,7 +76,7 @@ def simulate(
         raise InputError(f"The duration is {length!r} s; it must be more than 0, at most 1e9 s.")
     if log_period is None and setting.log_period_ms is not None:
         log_period = seconds_from_ms(setting.log_period_ms)
-    clock = replace(_clock(system), log=log_period)
+    clock = replace(clock_of(system), log=log_period)
     _check_pushes(system, length)
     common = {
         "duration": length,
@@ -154,23 +146,6 @@ def _with_delay_storage(run: Run, system: Design, q: Array) -> Run:
     stored, error = run.delay_storage(Y, delay=delay)
     audit = replace(run.audit, delay_storage=stored, delay_storage_error=error)
     return replace(run, audit=audit)
-
-
-def gait_margin(system: Design, jobs: int) -> Any:
-    """Return what `System.gait_margin` does.
-
-    Args:
-        system: the design.
-        jobs: number of processes.
-    """
-    return MeasuredGait.margin(
-        system.robot,
-        system.actuators,
-        system.required_walking(),
-        delays=system.delays,
-        clock=_clock(system),
-        jobs=jobs,
-    )
 
 
 def _on_the_spot(walking: Walking) -> Walking:
@@ -259,32 +234,3 @@ def _check_pushes(system: Design, length: float) -> None:
                 f"The push on {push.frame} begins at {push.start_s:g} s, but the run ends at "
                 f"{length:g} s; push earlier or simulate longer."
             )
-
-
-def _clock(system: Design) -> Clock:
-    """The design's own periods, and physics fine enough for springs and dampers.
-
-    Where a step not much finer divides the constant delays too, no step has to be split for them.
-    """
-    delays = system.delays.sampled()
-    central, embedded = delays.sample_time, delays.embedded_period
-    if system.simulation.physics_step_ms is not None:
-        step = system.simulation.physics_step_ms * 1e-3
-        return Clock(physics=step, embedded=embedded, central=central)
-    if embedded and abs(central / embedded - round(central / embedded)) > 1e-9:
-        raise InputError(
-            f"The central period of {central * 1e3:g} ms (delays.sample_time_ms) is no whole "
-            f"multiple of the embedded one of {embedded * 1e3:g} ms (delays.embedded_period_ms), "
-            "as a run needs it; change one of them."
-        )
-    rate, _ = system.actuators.fastest_link(system.robot, system.posture)
-    longest = max(SHORTEST_STEP, 2.0 * math.pi / (STEPS_PER_SWING * rate))
-    whole = embedded or central
-    coarsest = math.ceil(whole / min(LONGEST_STEP, longest) - 1e-9)
-    links = (delays.central.up, delays.central.down, delays.embedded.down)
-    constant = [link.delay.upper_bound for link in links if link.constant]
-    for count in range(coarsest, FINER * coarsest + 1):
-        parts = [delay * count / whole for delay in constant]
-        if all(abs(part - round(part)) < 1e-9 * max(1.0, part) for part in parts):
-            return Clock(physics=whole / count, embedded=embedded, central=central)
-    return Clock(physics=whole / coarsest, embedded=embedded, central=central)

@@ -224,9 +224,17 @@ class System(Design):
         Raises:
             InputError: there is no walk, the delays are 0, or a step is no whole number of periods.
         """
-        from sealag.design._simulate import gait_margin
+        from sealag.design._clock import clock_of
+        from sealag.simulation import MeasuredGait
 
-        return gait_margin(self, jobs)
+        return MeasuredGait.margin(
+            self.robot,
+            self.actuators,
+            self.required_walking(),
+            delays=self.delays,
+            clock=clock_of(self),
+            jobs=jobs,
+        )
 
     def certified_bounds(
         self, spaces: Spaces, rest: Rest | None = None, motion: Motion | None = None

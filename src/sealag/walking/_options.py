@@ -84,7 +84,7 @@ class WalkingOptions:
     height_stiffness: float = ranged(100.0, 0.0, 1e6, "1/s²")
     posture_stiffness: float = ranged(100.0, 0.0, 1e6, "1/s²")
     swing_stiffness: float = ranged(400.0, 0.0, 1e6, "1/s²")
-    heading_stiffness: float = ranged(0.0, 0.0, 1e6, "1/s²")
+    heading_stiffness: float = ranged(10.0, 0.0, 1e6, "1/s²")
     momentum_placement: bool = True
     bias_gain: float = ranged(0.3, 0.0, 10.0)
     placement_time: float = ranged(0.05, 0.0, 10.0, "s")
