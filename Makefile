@@ -4,13 +4,14 @@ BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help setup paper test quick fuzz mutants corpus bench lint wheel wheel-check clean
+.PHONY: help setup paper test quick fuzz kills mutants corpus bench lint wheel wheel-check clean
 
 help:
 	@echo "make paper   compute the paper's figures and claims into out/paper/"
 	@echo "make test    lint, types, import boundaries and the whole test suite"
 	@echo "make quick   the same without the tests marked slow"
 	@echo "make fuzz    fresh mutations of projects and robots for MINUTES=60, any SEED=n"
+	@echo "make kills   kill a sweep 20 times at random (KILLS=n), and see that no row is lost or computed twice"
 	@echo "make mutants falsify answers one by one, and see that a test notices (an hour); ROOM=delay for one room"
 	@echo "make corpus  take every robot below FOLDER=… through sealag, into OUT=out/corpus.md; ONLY=--read reads them"
 	@echo "make wheel-check  build sdist and wheel, install and use the wheel in a fresh environment"
@@ -52,6 +53,10 @@ quick: lint
 MINUTES ?= 60
 fuzz: setup
 	PYTHONPATH=tests $(BIN)/python -W ignore -m fuzz --minutes $(MINUTES) $(if $(SEED),--seed $(SEED))
+
+KILLS ?= 20
+kills: setup
+	KILLS=$(KILLS) $(BIN)/pytest -n 0 tests/cli/test_cli_sweep_killed.py
 
 mutants: setup
 	PYTHONPATH=tests $(BIN)/python -m mutants $(if $(ROOM),--room $(ROOM))

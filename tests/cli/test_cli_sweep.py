@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from helpers.sweeps import two_joints
+from helpers.two_joints import two_joints
 
 HAND = "tasks.hand.stiffness"
 DELAY = "delays.central_round_trip.value_ms"

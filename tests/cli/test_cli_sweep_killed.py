@@ -10,12 +10,14 @@ import time
 import pytest
 
 from helpers.source import ROOT
-from helpers.sweeps import two_joints
+from helpers.two_joints import two_joints
 
 pandas = pytest.importorskip("pandas")
 
-KILLS = 5
-OVER = ["--over", "tasks.hand.stiffness=10:400:log40", "--ask", "margin"]
+KILLS = int(os.environ.get("KILLS", "5"))
+"""`make kills` asks for 20."""
+POINTS = 8 * KILLS
+OVER = ["--over", f"tasks.hand.stiffness=10:400:log{POINTS}", "--ask", "margin"]
 ENVIRONMENT = {
     **os.environ,
     "PYTHONPATH": str(ROOT / "src"),
@@ -60,19 +62,52 @@ def test_a_killed_sweep_goes_on(tmp_path, cli):
         assert {name: after.get(name) for name in before} == before
         before = after
     assert killed == KILLS
-    assert 5 <= len(before) < 40
+    assert KILLS <= len(before) < POINTS
     process = begun(tmp_path, project, folder)
     text, _ = process.communicate()
     assert process.returncode == 0
-    assert f"points                     40, {40 - len(before)} of them" in text.decode()
+    assert f"points                     {POINTS}, {POINTS - len(before)} of them" in text.decode()
     assert {name: parts(folder)[name] for name in before} == before
     rows = pandas.read_parquet(folder)
-    assert rows["point"].tolist() == list(range(40))
+    assert rows["point"].tolist() == list(range(POINTS))
     assert cli("sweep", project, *OVER, "--jobs", 1, "--out", tmp_path / "whole")[0] == 0
     pandas.testing.assert_frame_equal(
         rows, pandas.read_parquet(tmp_path / "whole"), check_exact=True
     )
     assert parts(folder) == parts(tmp_path / "whole")
+
+
+def test_a_sweep_that_is_killed_while_it_writes_goes_on(tmp_path, cli):
+    """With half a file under way: first what the folder says of itself, then a part."""
+    project, folder = two_joints(tmp_path), tmp_path / "killed"
+    over = ["--over", "tasks.hand.stiffness=10:400:log6", "--ask", "bound", "--jobs", "1"]
+    dying = (
+        "import os, signal, sys\n"
+        "from sealag.cli import main\n"
+        "left, sync = [int(sys.argv[1])], os.fsync\n"
+        "def half(file):\n"
+        "    left[0] -= 1\n"
+        "    if left[0]:\n"
+        "        return sync(file)\n"
+        "    os.ftruncate(file, os.fstat(file).st_size // 2)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "os.fsync = half\n"
+        "main(sys.argv[2:])\n"
+    )
+    finished = {}
+    for writes in (1, 4):
+        command = [sys.executable, "-c", dying, str(writes), "sweep", project, *over]
+        done = subprocess.run([*command, "--out", folder], env=ENVIRONMENT, check=False)
+        assert done.returncode == -signal.SIGKILL
+        assert len(list(folder.glob(".*.sealag-draft"))) == 1
+        assert len(parts(folder)) == max(writes - 2, 0)
+        finished = parts(folder)
+    code, text, error = cli("sweep", project, *over, "--out", folder)
+    assert (code, error) == (0, "")
+    assert f"points                     6, {6 - len(finished)} of them" in text
+    assert cli("sweep", project, *over, "--out", tmp_path / "whole")[0] == 0
+    assert parts(folder) == parts(tmp_path / "whole")
+    assert not list(folder.glob(".*"))
 
 
 @pytest.mark.slow
@@ -86,8 +121,8 @@ def test_ctrl_c_leaves_what_is_finished(tmp_path):
     assert b"interrupted" in error
     assert b"Traceback" not in error
     left = parts(folder)
-    assert 4 <= len(left) < 40
+    assert 4 <= len(left) < POINTS
     process = begun(tmp_path, project, folder)
     assert process.wait(timeout=120.0) == 0
     assert {name: parts(folder)[name] for name in left} == left
-    assert len(pandas.read_parquet(folder)) == 40
+    assert len(pandas.read_parquet(folder)) == POINTS

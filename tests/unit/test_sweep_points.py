@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from helpers.sweeps import two_joints
+from helpers.two_joints import two_joints
 from sealag.errors import InputError
 from sealag.sweep import Sweep
 

@@ -11,8 +11,8 @@ import pytest
 
 import sealag
 from helpers.source import ROOT
-from helpers.sweeps import PROJECT, two_joints
 from helpers.toml import to_toml
+from helpers.two_joints import PROJECT, two_joints
 from sealag.design import System
 from sealag.errors import FileError, InputError
 from sealag.sweep import Sweep
