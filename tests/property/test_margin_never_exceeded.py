@@ -30,6 +30,22 @@ def test_certified_and_stable_never_exceeds_the_margin(corpus: list[PlantCompari
     assert sum(one.margin_s is None for one in corpus) < PLANTS // 100
 
 
+def test_the_jitter_margin_stands_between_them(corpus: list[PlantComparison]) -> None:
+    """passive ≤ jitter ≤ constant. Where the jitter margin is the smaller of the first two, its X is
+    not the best one: the passive bound never exceeds what some X could prove."""
+    short = 0
+    for one in corpus:
+        if one.certified_s is None or one.margin_s is None:
+            continue
+        plant = one.plant
+        loop = DelayedLoop(plant.A_0, plant.A_1, symmetries=plant.symmetries)
+        jitter = loop.jitter_margin()
+        assert jitter.delay <= one.margin_s * (1.0 + 1e-6)
+        assert one.certified_s <= jitter.upper * (1.0 + 1e-6)
+        short += one.certified_s > jitter.delay * (1.0 + 1e-6)
+    assert 0 < short < PLANTS // 20
+
+
 def test_published_criterion_exceeds_it(corpus: list[PlantComparison]) -> None:
     longer = [one for one in corpus if one.published_is_longer]
     assert len(longer) > PLANTS // 20
