@@ -31,8 +31,8 @@ def test_certified_and_stable_never_exceeds_the_margin(corpus: list[PlantCompari
 
 
 def test_the_jitter_margin_stands_between_them(corpus: list[PlantComparison]) -> None:
-    """jitter ≤ constant, and passive is at most what some X could prove: where it exceeds the jitter
-    margin, the X of that one is not the best."""
+    """jitter ≤ constant, and passive is at most what some X could prove: where it exceeds the
+    jitter margin, the X of that one is not the best."""
     short = 0
     for one in corpus:
         if one.certified_s is None or one.margin_s is None:
