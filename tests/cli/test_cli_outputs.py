@@ -30,7 +30,7 @@ def test_a_second_command_on_one_output_is_refused_before_it_computes(command, t
     assert (code, text) == (2, "")
     assert err == (
         f"sealag: {out} is being written by another process; wait for it, or choose another "
-        "--out.\n"
+        "name.\n"
     )
     assert out.read_bytes() == b"first"
 

@@ -35,7 +35,7 @@ def sweep_project(
     sweep = Sweep.of(project, over, tell=note, **asked)
     folder = out or Path(f"{sweep.system.name}.sweep")
     if plot is not None:
-        check_picture(plot, *sweep.system.files)
+        check_picture(plot, *sweep.system.files, beside=folder)
     compile_kernels()
     with _progress(sweep.sample.points) as progress:
         found = sweep.run(folder, jobs=jobs, scheduler=scheduler, progress=progress)
