@@ -125,7 +125,8 @@ class Question:
             )
         if self.aim is not Aim.BANDWIDTH and self.bandwidth is not None:
             raise InputError(
-                "A bandwidth is given, but the aim is another; leave one of them out, or aim at bandwidth."
+                "A bandwidth is given, but the aim is another; leave one of them out, or aim at "
+                "bandwidth."
             )
         if self.aim is Aim.DRAG and (self.motion is None or len(self.motion) < 2):
             raise InputError(
