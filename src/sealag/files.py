@@ -96,14 +96,14 @@ def check_output(path: Path, *inputs: Path) -> None:
         target = _target(path)
         if target.exists() and not target.is_file():
             raise FileError(
-                f"{path} is not a regular file and is not overwritten; choose another --out."
+                f"{path} is not a regular file and is not overwritten; choose another name."
             )
         if target.name.endswith(_DRAFT):
-            raise FileError(f"{path} is a name of unfinished files; choose another --out.")
+            raise FileError(f"{path} is a name of unfinished files; choose another name.")
         written = [one for one in (target, _draft_of(target)) if one.exists()]
         taken = any(other.exists() and one.samefile(other) for one in written for other in inputs)
     if taken:
-        raise FileError(f"{path} is an input and is not overwritten; choose another --out.")
+        raise FileError(f"{path} is an input and is not overwritten; choose another name.")
 
 
 def bundled(name: str, *, ending: str, what: str) -> Path:
@@ -157,7 +157,7 @@ def _target(path: Path) -> Path:
     """
     target = Path(os.path.realpath(path))
     if any(one.is_symlink() for one in (target, *target.parents)):
-        raise FileError(f"{path} is a link that leads back to itself; choose another --out.")
+        raise FileError(f"{path} is a link that leads back to itself; choose another name.")
     return target
 
 
@@ -210,7 +210,7 @@ class Draft:
                     if time.monotonic() >= last:
                         raise FileError(
                             f"{path} is being written by another process; wait for it, or choose "
-                            "another --out."
+                            "another name."
                         ) from None
                     time.sleep(_POLL)
 

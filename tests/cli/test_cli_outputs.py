@@ -29,8 +29,7 @@ def test_a_second_command_on_one_output_is_refused_before_it_computes(command, t
         first.keep()
     assert (code, text) == (2, "")
     assert err == (
-        f"sealag: {out} is being written by another process; wait for it, or choose another "
-        "--out.\n"
+        f"sealag: {out} is being written by another process; wait for it, or choose another name.\n"
     )
     assert out.read_bytes() == b"first"
 

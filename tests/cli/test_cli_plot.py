@@ -106,6 +106,25 @@ def test_a_point_of_a_front_is_written_and_certified(cli, tmp_path):
     assert json.loads(text)["max_delay_s"] == pytest.approx(points[1]["delay_s"], rel=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [("certify", "--out"), ("simulate", "--out"), ("tune", "--write"), ("sweep", "--out")],
+)
+def test_a_picture_never_replaces_the_other_output(command, option, recording, cli, tmp_path):
+    """Both were said to be written, and one was there."""
+    project, path = tmp_path / "go2.toml", tmp_path / "both.svg"
+    project.write_text(GO2.read_text())
+    more = {
+        "certify": ["--motion", recording[0]],
+        "sweep": ["--over", "simulation.seed=1", "--jobs", 1],
+    }.get(command, [])
+    options = [option, path, "--plot", tmp_path / "." / "both.svg"]
+    code, _, error = cli(command, project, *more, *options)
+    assert code == 2
+    assert "is asked for twice" in error
+    assert not path.exists()
+
+
 def test_a_mapping_in_words_and_in_the_file(cli, tmp_path):
     project = tmp_path / "go2.toml"
     text = GO2.read_text()

@@ -87,3 +87,21 @@ def test_what_is_wrong_ends_with_2_and_one_sentence(
     assert said in error
     assert len(error.splitlines()) == 1
     assert not (tmp_path / "two.sweep").exists() or not list((tmp_path / "two.sweep").glob("part*"))
+
+
+def test_a_question_that_no_point_can_answer_says_why(project, cli, tmp_path):
+    """A word of --ask that tune does not know; a dataset of refusals is no success."""
+    options = ("sweep", project, *GRID, "--ask", "tune:aim=foo", "--out", tmp_path / "o")
+    code, text, _ = cli(*options)
+    assert code == 2
+    assert "first of them            aim is 'foo'; it must be stiffness" in text
+    code, text, _ = cli(*options, "--json")
+    assert (code, json.loads(text)["refusal"][:13]) == (2, "aim is 'foo';")
+
+
+def test_yes_and_no_are_said_by_what_was_asked(project, cli, tmp_path):
+    code, text, _ = cli("sweep", project, *GRID, "--ask", "bound", "--out", tmp_path / "o")
+    assert code == 0
+    assert "  not passive " in text
+    assert "  passive " in text
+    assert "True" not in text

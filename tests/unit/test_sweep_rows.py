@@ -177,6 +177,11 @@ def test_no_scheduler_is_one_sentence(project, tmp_path, monkeypatch):
     sweep = Sweep.of(project, GRID)
     with pytest.raises(InputError, match="does not go with"):
         sweep.run(tmp_path / "o", jobs=2, scheduler="tcp://127.0.0.1:9")
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", None)  # its remains would print a traceback
+    for address in ("foo", "tcp://127.0.0.1", "http://10.0.0.1:8786", "tcp://127.0.0.1:x"):
+        with pytest.raises(InputError, match="no scheduler answers there"):
+            sweep.run(tmp_path / "o", scheduler=address)
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match="needs the package distributed"):
         sweep.run(tmp_path / "o", scheduler="tcp://127.0.0.1:9")

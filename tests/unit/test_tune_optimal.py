@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 
+import sealag
+from helpers.designs import EXAMPLES
 from helpers.small_systems import arm, arm_system, constant_delays, joint_task
 from sealag.errors import InputError
 from sealag.passivity import Status
@@ -143,3 +145,12 @@ def test_weights_are_asked_for(tmp_path):
         tune(system, limits={"torque": 1.0})
     with pytest.raises(InputError, match="let the number be passive"):
         tune(system, aim="optimal", number="jitter", limits={"error": 0.1, "torque": 1.0})
+
+
+def test_what_stops_the_optimum_is_what_stops_the_largest_stiffness():
+    """With one factor in common and a costly error both are the same gains."""
+    anymal = sealag.load(EXAMPLES / "anymal.toml")
+    best = tune(anymal, aim="optimal", limits={"error": 0.02, "torque": 30.0})
+    most = tune(anymal)
+    assert best.binding.kind == most.binding.kind == "spring"
+    assert best.binding.spring_share == pytest.approx(most.binding.spring_share, rel=1e-4)

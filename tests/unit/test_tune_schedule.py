@@ -12,7 +12,7 @@ from sealag.errors import InputError, MotionError
 from sealag.passivity import Certificate, Status
 from sealag.robot import Motion
 from sealag.tune import tune
-from sealag.whole_body import Law, Task
+from sealag.whole_body import Law, StaticJoint, Task
 
 INSTANTS = 60
 RATE = 1.5
@@ -87,6 +87,22 @@ def test_a_schedule_is_certified_while_its_matrices_move(swinging, tuned, tmp_pa
     for constant in (tuned.schedule.stiffness.max(), tuned.schedule.stiffness.mean()):
         held = replace(motion, stiffness=np.full(INSTANTS, constant))
         assert system.certified_bounds(system.spaces(held)).delay.min() < system.delays.d_1
+
+
+@pytest.mark.parametrize("softness", [1.0, 20.0])
+def test_a_schedule_sits_on_its_boundary(swinging, softness):
+    """Also where springs have most of the compliance, so that a little gain is much delay."""
+    system, motion = swinging
+    drives = system.actuators
+    soft = replace(
+        system, actuators=replace(drives, spring_stiffness=drives.spring_stiffness / softness)
+    )
+    soft = replace(soft, law=replace(soft.law, signal=StaticJoint()))
+    found = tune(soft, motion, aim="schedule", limits={"rate": RATE})
+    assert found.found
+    more = replace(found.schedule, stiffness=1.001 * found.schedule.stiffness)
+    answer = sealag.certify(soft, more, time_varying=True).answer
+    assert min(answer.max_delay_s, answer.time_varying_delay_s) < soft.delays.d_1
 
 
 def test_one_instant_of_a_schedule_is_the_design_with_its_gains(swinging, tuned):

@@ -72,7 +72,7 @@ def certify_project(
     path = out or Path(f"{system.name}.certificate.json")
     inputs = [*system.files, *([motion] if motion else [])]
     check_output(path, *inputs)
-    check_picture(plot, path, *inputs)
+    check_picture(plot, *inputs, beside=path)
     along = system.motion_of(motion, **reading, tell=note)
     require_motion(plot, len(along))
     system.criterion_asked(along, criterion, time_varying=time_varying, proofs=count)

@@ -1,5 +1,6 @@
 """Pictures of the commands' answers: which curves, in which units."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sealag.cli._terminal import show
-from sealag.errors import InputError
+from sealag.errors import FileError, InputError
 from sealag.files import check_output
 from sealag.passivity import Certificate
 from sealag.picture import Curve, Picture, ending_of
@@ -21,20 +22,26 @@ _MOST_POINTS = 5000
 """Points of a curve of a run; more are below the width of a pixel."""
 
 
-def check_picture(path: Path | None, *inputs: Path) -> None:
+def check_picture(path: Path | None, *inputs: Path, beside: Path | None = None) -> None:
     """Refuse a picture that could not be drawn, before anything is computed.
 
     Args:
         path: the picture; None for none.
         inputs: files that the command reads.
+        beside: what else the command writes; None for nothing.
 
     Raises:
         InputError: its ending is none of a picture's.
-        FileError: it is an input, or no file can have the name.
+        FileError: it is an input or what else is written, or no file can have the name.
     """
     if path is not None:
         ending_of(path)
         check_output(path, *inputs)
+        if beside is not None and os.path.realpath(path) == os.path.realpath(beside):
+            raise FileError(
+                f"{path} is asked for twice, as picture and as the command's own output; choose "
+                "another name for --plot."
+            )
 
 
 def drawn(path: Path | None) -> dict[str, str]:

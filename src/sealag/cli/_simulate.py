@@ -46,7 +46,7 @@ def simulate_project(
     system = design.load(project)
     path = out or Path(f"{system.name}.mcap")
     check_output(path, *system.files)
-    check_picture(plot, path, *system.files)
+    check_picture(plot, *system.files, beside=path)
     length = system.duration(scenario) if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"--duration is {length}; a positive time in s is needed.")

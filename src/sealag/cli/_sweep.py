@@ -30,12 +30,13 @@ def sweep_project(
     """Ask every point, write the dataset and show what it comes to.
 
     Returns:
-        0 if every point has its row; 3 if the tool itself failed at some.
+        0 if every point has its row; 2 if all of them are refused; 3 if the tool itself failed at
+        some.
     """
     sweep = Sweep.of(project, over, tell=note, **asked)
     folder = out or Path(f"{sweep.system.name}.sweep")
     if plot is not None:
-        check_picture(plot, *sweep.system.files)
+        check_picture(plot, *sweep.system.files, beside=folder)
     compile_kernels()
     with _progress(sweep.sample.points) as progress:
         found = sweep.run(folder, jobs=jobs, scheduler=scheduler, progress=progress)
@@ -46,8 +47,10 @@ def sweep_project(
     else:
         show(f"{'points':26} {found.points}, {found.computed} of them computed now")
         for verdict, count in found.verdicts.items():
-            show(f"{'  ' + verdict.replace('_', ' '):26} {count}")
+            show(f"{'  ' + _verdict(verdict, found.verdict):26} {count}")
         show(f"{'refused':26} {found.refused}")
+        if found.refusal is not None:
+            show(f"{'  first of them':26} {found.refusal}")
         if found.smallest is not None:
             show(f"{found.column:26} {found.smallest:.6g} to {found.largest:.6g}")
         show(f"{'dataset':26} {found.folder}")
@@ -56,7 +59,12 @@ def sweep_project(
     if found.failed:
         show(f"sealag: the tool itself failed at {found.failed} points; see error", error=True)
         return 3
-    return 0
+    return 2 if found.refused == found.points else 0
+
+
+def _verdict(word: str, column: str | None) -> str:
+    """A verdict in words; yes and no by what was asked."""
+    return {"True": f"{column}", "False": f"not {column}"}.get(word, word.replace("_", " "))
 
 
 @contextmanager

@@ -75,7 +75,7 @@ def tune_project(
         _check_target(write, system, motion, delay)
     if write is not None and word == "schedule":
         check_output(write.with_suffix(".schedule.csv"), *system.files, *filter(None, [motion]))
-    check_picture(plot, *system.files, *([motion] if motion else []))
+    check_picture(plot, *system.files, *([motion] if motion else []), beside=write)
     along = system.motion_of(motion)
     compile_kernels()
     with busy("tuning", along):

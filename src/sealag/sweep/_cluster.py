@@ -31,6 +31,8 @@ def on_cluster(
     """
     distributed = extra("distributed", use="--scheduler")
     try:
+        # A client of what is no address would wait and print a traceback as it is dropped.
+        distributed.comm.get_address_host_port(scheduler)
         client = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(

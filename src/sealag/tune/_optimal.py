@@ -67,6 +67,7 @@ def optimal(question: Question) -> Tuned:
         question,
         knobs.design(eased),
         kind="delay" if active else "index",
+        spring_share=knobs.limits(question.required).wall(at_limit).spring if active else 0.0,
         factors={group.name: float(gain) for group, gain in zip(knobs.groups, eased)},
         limit=found.value,
         index=found,

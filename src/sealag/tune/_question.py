@@ -124,16 +124,19 @@ class Question:
                 f"The aim {self.aim} is a program of the passive bound; let the number be passive."
             )
         if self.aim is not Aim.BANDWIDTH and self.bandwidth is not None:
-            raise InputError("A bandwidth is given, but the aim is another; maximize bandwidth.")
+            raise InputError(
+                "A bandwidth is given, but the aim is another; leave one of them out, or aim at "
+                "bandwidth."
+            )
         if self.aim is Aim.DRAG and (self.motion is None or len(self.motion) < 2):
             raise InputError(
                 "Drag is what motor damping takes along a motion; give a motion (--motion), or "
-                "minimize damping."
+                "aim at damping."
             )
         if self.aim is Aim.BANDWIDTH and not pd_keys(self.system):
             raise InputError(
                 f"{self.system.name} has no joint PD whose bandwidth could be set "
-                '(controller.kind = "joint_pd"); maximize stiffness.'
+                '(controller.kind = "joint_pd"); aim at stiffness.'
             )
         if self.aim is Aim.MAPPING and not self.system.law.damped:
             raise InputError(

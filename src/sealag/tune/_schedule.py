@@ -1,12 +1,15 @@
 """The largest stiffness at each instant of a motion that changes at a bounded rate (docs/theory
 section 16.9)."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from sealag.design import certify
-from sealag.passivity import Criterion, Status
+from sealag.passivity import Certificate, Criterion, Status
+from sealag.robot import Motion
 from sealag.tune._answer import Binding, Tuned
 from sealag.tune._gains import floored
 from sealag.tune._passive import EASE, Knobs
@@ -15,8 +18,24 @@ from sealag.typing import Array
 from sealag.units import time_text
 
 _TRIES = 8
-"""Certificates of a schedule that is scaled down to what polytopes prove; one or two are enough
+"""Certificates of a schedule that is scaled down to what polytopes prove; one to four are enough
 where the motion is finely sampled."""
+_NEAR = 2e-4
+"""Share of the delay by which a schedule may stay below its boundary: 0.1 % more is beyond it."""
+
+
+class _Tried(NamedTuple):
+    """A schedule scaled by a share: its least factor, motion, certificate and delay."""
+
+    share: float
+    least: float
+    motion: Motion
+    certificate: Certificate
+    reached: float
+
+    @property
+    def certified(self) -> bool:
+        return self.certificate.answer.status is Status.CERTIFIED
 
 
 def scheduled(question: Question) -> Tuned:
@@ -42,8 +61,8 @@ def scheduled(question: Question) -> Tuned:
         return Tuned.none(question, "no delay limits the stiffness at any instant")
     log = _steady(np.log(largest), motion.time, rate)
     own = np.ones(len(motion)) if motion.stiffness is None else motion.stiffness
-    share = 1.0
-    for _ in range(_TRIES):
+
+    def tried(share: float) -> _Tried:
         factors = floored(share * np.exp(log))
         followed = replace(motion, stiffness=factors * own)
         certificate = certify(
@@ -51,9 +70,11 @@ def scheduled(question: Question) -> Tuned:
         ).confirmed()
         answer = certificate.answer
         reached = min(answer.max_delay_s, answer.time_varying_delay_s or 0.0)
-        if reached >= question.required or not reached > 0.0:
-            break
-        share *= reached / question.required * (1.0 - EASE)
+        return _Tried(share, float(factors.min()), followed, certificate, reached)
+
+    last = _at_the_boundary(tried, question.required)
+    certificate, reached = last.certificate, last.reached
+    answer = certificate.answer
     held = reached >= question.required
     reasons = () if answer.status is Status.CERTIFIED else answer.reasons
     if not held:
@@ -75,13 +96,40 @@ def scheduled(question: Question) -> Tuned:
         system=system,
         reached_s=reached,
         found=held and not reasons,
-        scale=float(factors.min()),
+        scale=last.least,
         factors={},
         binding=binding,
         certificate=certificate,
         reasons=reasons,
-        schedule=followed,
+        schedule=last.motion,
     )
+
+
+def _at_the_boundary(tried: Callable[[float], _Tried], required: float) -> _Tried:
+    """The stiffest share that reaches a delay, to `_NEAR`; the last one tried if none does.
+
+    Springs and delays are in series, so that the delay is nearly linear in 1/share.
+    """
+    share, held, broken = 1.0, None, None
+    for _ in range(_TRIES):
+        one = tried(share)
+        if one.reached < required:
+            broken = one
+        elif held is None or one.certified or not held.certified:
+            held = one
+        else:  # passive, but no longer stable
+            break
+        if held is None:
+            if not one.reached > 0.0:
+                break
+            share = one.share * one.reached / required * (1.0 - EASE)
+        elif broken is None or held.reached <= required * (1.0 + _NEAR):
+            break
+        else:
+            wanted = required * (1.0 + 0.5 * _NEAR) - broken.reached
+            part = wanted / (held.reached - broken.reached)
+            share = 1.0 / ((1.0 - part) / broken.share + part / held.share)
+    return held or one
 
 
 def _steady(log: Array, time: Array, rate: float) -> Array:
