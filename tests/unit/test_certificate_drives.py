@@ -128,5 +128,9 @@ def test_the_frozen_loop_is_compared_with_the_designs():
     turned = {key: (T @ np.array(loop[key]) @ T.T) for key in ("A_0", "A_1")}
     A_0 = turned["A_0"]
     A_0[:half] = np.eye(half, len(T), k=half)
-    assert bad({**loop, "A_0": A_0.tolist(), "A_1": turned["A_1"].tolist()}) == []
+    P = T @ np.array(loop["jitter"]["P"]) @ T.T
+    proof = {**loop["jitter"], "P": ((P + P.T) / 2.0).tolist()}
+    same = {**loop, "A_0": A_0.tolist(), "A_1": turned["A_1"].tolist()}
+    assert bad({**same, "jitter": proof}) == []
+    assert bad(same) == ["jitter margin: matrix inequality"]
     assert "design: local_loop" in bad({**loop, "at": "rest"})

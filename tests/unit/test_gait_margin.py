@@ -74,10 +74,16 @@ def _sections(case, *, force):
 
 
 def _rate(case):
-    """By how much a stride changes what a small push has left, late."""
-    left = np.linalg.norm(_sections(case, force=1.0) - _sections(case, force=-1.0), axis=1)
-    stride = np.arange(25, 37)
-    return float(np.exp(np.polyfit(stride, np.log(left[stride]), 1)[0])), left
+    """By how much a stride changes what a small push has left, late, and how much that is.
+
+    Three modes are left, a pair and a single one, so that sizes alone beat: the stride's map on the
+    span of three directions (dynamic mode decomposition) tells them apart.
+    """
+    left = _sections(case, force=1.0) - _sections(case, force=-1.0)
+    before, after = left[25:36].T, left[26:37].T
+    U, sizes, V = np.linalg.svd(before, full_matrices=False)
+    stride = U[:, :3].T @ after @ V[:3].T / sizes[:3]
+    return float(np.abs(np.linalg.eigvals(stride)).max()), np.linalg.norm(left, axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -93,8 +99,7 @@ def test_multipliers_predict_how_a_push_decays(case, orbit):
     """The plain simulator, pushed one way and the other, forgets at the largest one's rate."""
     rate, left = _rate(case)
     assert left[24:].max() < 0.1
-    assert abs(orbit.multipliers[0]) == pytest.approx(0.637, abs=0.01)
-    assert rate == pytest.approx(abs(orbit.multipliers[0]), rel=0.05)
+    assert rate == pytest.approx(abs(orbit.multipliers[0]), rel=0.03)
     assert orbit.residual < 1e-7
 
 

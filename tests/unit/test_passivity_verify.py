@@ -18,6 +18,7 @@ SEED = 20261124
 CHECKERS = (
     "reading", "certificate", "stated", "statement", "layout", "kinds", "checks", "claims",
     "definite", "proofs", "shared", "supremum", "local", "axis", "sweep", "headline",
+    "jitter_proof", "balls",
 )  # fmt: skip
 
 

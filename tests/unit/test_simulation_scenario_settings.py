@@ -20,9 +20,9 @@ def test_the_tracked_reference_swings_as_its_settings_say(tmp_path, monkeypatch)
     """Offset size (1 − cos 2πft)/2 of the first row, and the rate that is its derivative."""
     seen, controller = [], System.controller
 
-    def spy(system, posture=None, *, reference=None):
+    def spy(system, posture=None, *, reference=None, **choices):
         seen.append(reference)
-        return controller(system, posture, reference=reference)
+        return controller(system, posture, reference=reference, **choices)
 
     monkeypatch.setattr(System, "controller", spy)
     system = with_setting(arm_system(tmp_path), track_amplitude=0.06, track_frequency_hz=0.7)
