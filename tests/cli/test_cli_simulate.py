@@ -176,7 +176,7 @@ def test_ctrl_c_while_recording_keeps_the_one_before(tmp_path, cli, monkeypatch)
         (["--duration", "0"], "duration"),
         (["--duration", "nan"], "duration"),
         (["--delay-scale", "-1"], "--delay-scale"),
-        (["--out", ""], "--out"),
+        (["--out", ""], "not a regular file"),
         (["--log-ms", "20.3"], "the log period of 20.3 ms"),
     ],
 )
